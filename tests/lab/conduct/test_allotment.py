@@ -83,14 +83,16 @@ def test_asking_again_changes_nothing_and_a_redraw_keeps_the_rows(
 ) -> None:
     allot_schedules(study, williams())
     log = study.conduct_file.read_bytes()
+    rows = allotted(study)
     assert allot_schedules(study, williams()) == ()
     study.schedule_file("R2", "test").unlink()
     assert len(allot_schedules(study, williams())) == 2
+    assert study.conduct_file.read_bytes() == log
     changed = williams(seed=2)
     with pytest.raises(ScheduleError, match="2 of 2 schedules are stale"):
         allot_schedules(study, changed)
     allot_schedules(study, changed, redraw=True)
-    assert study.conduct_file.read_bytes() == log
+    assert allotted(study) == rows
     assert read_schedule(study.schedule_file("R2", "test")).row == 2
 
 
@@ -185,12 +187,12 @@ def rewritten(study: StudyPaths, change: dict[str, object]) -> None:
     [
         (
             {"row": 5},
-            "line 3: allotted: rater R2 in session test: needed row 2, the next one, "
+            "line 4: allotted: rater R2 in session test: needed row 2, the next one, "
             "got 5",
         ),
         (
             {"rater": "R1"},
-            "line 3: allotted: rater R1 in session test: needed a rater without a row, "
+            "line 4: allotted: rater R1 in session test: needed a rater without a row, "
             "got one with row 1",
         ),
     ],
@@ -216,7 +218,7 @@ def test_a_schedule_whose_row_no_event_has_is_found(study: StudyPaths) -> None:
 def test_a_changed_line_of_the_log_stops_the_draw(study: StudyPaths) -> None:
     allot_schedules(study, williams())
     edit(study.conduct_file, '"row": 1', '"row": 3')
-    with pytest.raises(SessionLogError, match="line 3: needed previous"):
+    with pytest.raises(SessionLogError, match="line 4: needed previous"):
         allot_schedules(study, williams(raters=("R1", "R2", "R3")))
 
 
@@ -273,7 +275,7 @@ def test_two_copies_that_dealt_one_row_are_found(
     (second,) = [each for each in problems if "needed row 3, the next one" in each]
     # the log of the copy, not that of the study that it was merged into
     logs = (study.conduct_file, study.merged_conduct / "a.jsonl")
-    assert second.startswith(tuple(f"{log}: line 2: allotted: rater" for log in logs))
+    assert second.startswith(tuple(f"{log}: line 3: allotted: rater" for log in logs))
     allotted_by = {log: log.read_text() for log in logs}
     rater = second.partition("rater ")[2].partition(" ")[0]
     assert f'"{rater}"' in allotted_by[Path(second.partition(": line")[0])]

@@ -9,6 +9,7 @@ import pytest
 
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.lab.conduct import (
+    Note,
     excluded_raters,
     rater_values,
     read_conduct,
@@ -44,6 +45,7 @@ def test_events_are_a_chain_with_a_head(small: Small) -> None:
         "rater": "R2",
         "who": "MK",
         "why": "moved away",
+        "on": None,
     }
 
 
@@ -179,19 +181,35 @@ def test_an_adverse_event_has_what_a_note_has_not(small: Small) -> None:
     record_note(
         study,
         protocol,
-        "bruised thumb",
-        who="MK",
-        kind="adverse-event",
-        rater="R1",
-        session="test",
-        severity="mild",
-        action=" ice ",
+        Note(
+            text="bruised thumb",
+            who="MK",
+            kind="adverse-event",
+            rater="R1",
+            session="test",
+            on="2026-05-02",
+            onset="2026-05-01",
+            severity="mild",
+            seriousness="not serious",
+            relatedness="possible",
+            action=" ice ",
+        ),
     )
     (event,) = read_conduct(study)
     assert (event.fields["severity"], event.fields["action"]) == ("mild", "ice")
+    assert (event.fields["on"], event.fields["onset"]) == ("2026-05-02", "2026-05-01")
     assert event.fields["outcome"] is None
     with pytest.raises(ParameterError, match="severity: needed with kind 'adverse-ev"):
-        record_note(study, protocol, "late", who="MK", severity="mild")
+        record_note(study, protocol, Note(text="late", who="MK", severity="mild"))
+    for wrong, needed in (
+        ({"seriousness": "grave"}, "needed one of serious, not serious"),
+        ({"relatedness": "yes"}, "needed one of unrelated, unlikely"),
+        ({"onset": "yesterday"}, "needed a day up to"),
+        ({"on": "2999-01-01"}, "needed a day up to"),
+    ):
+        note = Note(text="a", who="MK", kind="adverse-event", **wrong)
+        with pytest.raises(ParameterError, match=needed):
+            record_note(study, protocol, note)
 
 
 def test_merged_logs_are_read_in_order_of_time(small: Small) -> None:
@@ -199,19 +217,20 @@ def test_merged_logs_are_read_in_order_of_time(small: Small) -> None:
     study, protocol = small
     for hour in (9, 8, 11):
         day = datetime(2026, 1, 1, hour, tzinfo=UTC)
-        record_note(study, protocol, f"A{hour}", who="MK", now=lambda day=day: day)
+        note = Note(text=f"A{hour}", who="MK")
+        record_note(study, protocol, note, now=lambda day=day: day)
     study.merged_conduct.mkdir()
     study.conduct_file.rename(study.merged_conduct / "north.jsonl")
     day = datetime(2026, 1, 1, 10, tzinfo=UTC)
-    record_note(study, protocol, "B10", who="MK", now=lambda: day)
+    record_note(study, protocol, Note(text="B10", who="MK"), now=lambda: day)
     texts = [event.fields["text"] for event in read_conduct(study)]
     assert texts == ["A9", "A8", "B10", "A11"]
 
 
 def test_a_changed_line_of_a_merged_log_is_found(small: Small) -> None:
     study, protocol = small
-    record_note(study, protocol, "a", who="MK")
-    record_note(study, protocol, "b", who="MK")
+    record_note(study, protocol, Note(text="a", who="MK"))
+    record_note(study, protocol, Note(text="b", who="MK"))
     study.merged_conduct.mkdir()
     moved = study.conduct_file.rename(study.merged_conduct / "north.jsonl")
     edit(moved, '"a"', '"c"')

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from masrel.cli import cli
 from masrel.errors import MasrelError, ParameterError, ProtocolError, ScheduleError
 from masrel.lab.conduct import (
+    Note,
     excluded_raters,
     read_conduct,
     record_note,
@@ -128,7 +129,7 @@ def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
 
 def test_both_chains_of_conduct_stay_whole(sites: Sites, tmp_path: Path) -> None:
     north, south = sites
-    record_note(north, read_protocol(north.protocol), "power cut", who="MK")
+    record_note(north, read_protocol(north.protocol), Note(text="power cut", who="MK"))
     record_standing(
         south, read_protocol(south.protocol), "R3", "excluded", who="AB", why="ill"
     )
@@ -159,7 +160,8 @@ def test_what_is_merged_is_its_owners_alone(
     sites: Sites, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for study in sites:
-        record_note(study, read_protocol(study.protocol), "ill", who="MK", rater="R2")
+        note = Note(text="ill", who="MK", rater="R2")
+        record_note(study, read_protocol(study.protocol), note)
     for path in sites[0].root.rglob("*"):  # as after a copy from elsewhere
         path.chmod(0o777 if path.is_dir() else 0o666)
     ever_open, original = [], os.write
@@ -195,7 +197,8 @@ def test_what_is_merged_is_its_owners_alone(
 def test_a_merged_study_is_merged_with_a_third(
     sites: Sites, new_study: NewStudy, tmp_path: Path
 ) -> None:
-    record_note(sites[0], read_protocol(sites[0].protocol), "power cut", who="MK")
+    protocol = read_protocol(sites[0].protocol)
+    record_note(sites[0], protocol, Note(text="power cut", who="MK"))
     both = merge_studies(sites, tmp_path / "both")
     west = StudyPaths(site(new_study, "west", "R5"))
     run(west, "R5")

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError
-from masrel.lab.conduct import record_note, record_standing
+from masrel.lab.conduct import Note, record_note, record_standing
 from masrel.lab.progress import (
     NextStep,
     next_step,
@@ -88,7 +88,8 @@ def test_a_line_that_a_kill_cut_off_hides_nothing(small: Small) -> None:
     assert "2 of 3" in shown
     assert shown.count("ends without a newline") == 2
     assert f"next: masrel run {study.root} --rater R1 --session test" in shown
-    record_note(study, protocol, "power cut", who="MK")  # takes the torn line out
+    # takes the torn line out
+    record_note(study, protocol, Note(text="power cut", who="MK"))
     assert status(small)["R2"] == "withdrawn"
     assert "note: text power cut" in call("status", study.root)
 

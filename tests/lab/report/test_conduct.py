@@ -7,6 +7,7 @@ import pytest
 from masrel.errors import ParameterError
 from masrel.lab.analysis import analyze
 from masrel.lab.conduct import (
+    Note,
     record_note,
     record_rater_values,
     record_standing,
@@ -98,12 +99,16 @@ def test_what_is_private_is_shown_when_it_is_asked_for(
     record_rater_values(study, protocol, "R1", {"years": "3", "job": "PT"}, who="Kim")
     record_rater_values(study, protocol, "R2", {"years": "8"}, who="Kim")
     record_note(
-        *(study, protocol, "bruised thumb"),
-        who="Kim",
-        kind="adverse-event",
-        rater="R2",
-        severity="mild",
-        action="ice",
+        study,
+        protocol,
+        Note(
+            text="bruised thumb",
+            who="Kim",
+            kind="adverse-event",
+            rater="R2",
+            severity="mild",
+            action="ice",
+        ),
     )
     record_unblinding(study, protocol, None, who="Kim", why="an injury")
     record_standing(study, protocol, "R1", "withdrawn", **BY)

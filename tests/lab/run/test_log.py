@@ -312,7 +312,8 @@ FAULT = step("presented", code="A", fault="too fast")
 CORRECTED = step("correction", code="A", grade="3")
 TAKEN, SKIPPED = step("correction", code="A"), step("skipped", code="A")
 OTHER_SOURCE = step("resumed", grades="script")
-RECOVERED, DONE = step("recovered"), step("complete")
+RECOVERED = step("recovered")
+DONE = [step("complete", n_presentations=number) for number in range(2)]
 
 
 @pytest.mark.parametrize(
@@ -328,9 +329,9 @@ RECOVERED, DONE = step("recovered"), step("complete")
             1,
             0,
         ),
-        ([BEGUN, A_SHOWN, A_GRADED, CORRECTED, DONE, CORRECTED], "complete", 1, 0),
-        ([BEGUN, FAULT, SKIPPED, DONE], "complete", 0, 1),
-        ([BEGUN, FAULT, SKIPPED, DONE, CORRECTED], "complete", 1, 1),
+        ([BEGUN, A_SHOWN, A_GRADED, CORRECTED, DONE[1], CORRECTED], "complete", 1, 0),
+        ([BEGUN, FAULT, SKIPPED, DONE[1]], "complete", 0, 1),
+        ([BEGUN, FAULT, SKIPPED, DONE[1], CORRECTED], "complete", 1, 1),
         ([BEGUN, A_SHOWN, A_GRADED, TAKEN, B_SHOWN, CORRECTED, TAKEN], "begun", 0, 0),
     ],
 )
@@ -371,7 +372,8 @@ def test_a_log_says_where_its_session_stands(
         ([BEGUN, FAULT, SKIPPED, SKIPPED], "line 4: skipped: .* nor skipped, got A"),
         ([BEGUN, FAULT, SKIPPED, A_SHOWN], "line 4: presented: .* nor skipped, got A"),
         ([BEGUN, FAULT, step("skipped", code="A", who=3)], "line 3: .* value of who"),
-        ([BEGUN, DONE, A_SHOWN], "line 3: presented: needed no event but a corr"),
+        ([BEGUN, DONE[0], A_SHOWN], "line 3: presented: needed no event but a corr"),
+        ([BEGUN, DONE[1]], "line 2: complete: needed n_presentations 0, as many as"),
     ],
 )
 def test_what_makes_no_session_is_refused_with_the_line(
