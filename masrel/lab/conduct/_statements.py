@@ -14,6 +14,7 @@ from masrel.lab.conduct._study_log import (
     append_event,
     check_choice,
     check_rater,
+    open_conduct,
     past_day,
     read_conduct,
     stated,
@@ -274,7 +275,7 @@ def record_new_rater(
     ------
     ParameterError
         If the protocol has no such session or field, a value is not of the field's
-        type, or `who` is blank.
+        type, the rater was added before, or `who` is blank.
     ProtocolError
         If the protocol would be wrong with this rater; nothing is written then.
     SessionLogError
@@ -287,13 +288,21 @@ def record_new_rater(
     known = {
         name: _checked_value(study, protocol.rater_fields, name, text)
         for name, text in values.items()
+        if text.strip()
     }
     entry: dict[str, object] = {"id": rater}
     entry |= {} if site is None else {"site": site}
     entry |= {"fields": known} if known else {}
     fields = {"rater": rater, "site": site, **stated(who=who)}
-    _write_rater(study.protocol, entry, sessions)
-    append_event(study, protocol, "rater-added", fields, now=now)
+    with open_conduct(study, protocol, now=now) as log:  # nobody else adds meanwhile
+        for event in log.events:
+            if event.kind == "rater-added" and event.fields["rater"] == rater:
+                raise ParameterError(
+                    f"rater: needed one who was not added before, {rater} was on "
+                    f"{event.time_utc[:10]} by {event.fields['who']}"
+                )
+        _write_rater(study.protocol, entry, sessions)
+        log.append("rater-added", fields)
 
 
 def _checked_value(

@@ -111,10 +111,11 @@ def enter_sheet(
     with SessionLog.open(log_file, now=now) as log:
         state = replay(log.path, log.events)
         _begin(study, protocol, form, device, state, log)
-        if on is not None and state.held_on is None:
-            log.append("held", {"on": on.isoformat()})
-            log_interval(study, protocol, rater, session, log)
         _refuse_entered(sheet, log)
+        if on is not None:
+            if state.held_on is None:
+                log.append("held", {"on": on.isoformat()})
+            log_interval(study, protocol, rater, session, log)
         for row in rows:
             if row.place == "study":
                 _answer_about_study(study, protocol, row, form.rater, now)

@@ -127,11 +127,16 @@ def _write_rater(
 ) -> None:
     """Write a rater, and in which sessions, into a protocol; comments and layout stay.
 
-    Nothing is written where the protocol would be wrong with this rater.
+    Nothing is written where the protocol would be wrong with this rater, or has what is
+    to be written.
     """
     import tomlkit  # nothing else needs it
 
-    document = tomlkit.parse(path.read_text(encoding="utf-8"))
+    document = tomlkit.parse(read_regular(path, most=MAX_SMALL))
+    there = document.unwrap()
+    its = {s["id"] for s in there["sessions"] if entry["id"] in s["raters"]}
+    if entry in there["raters"] and its == {*sessions}:
+        return  # by a process that died then
     document["raters"].append(dict(entry))
     for session in document["sessions"]:
         if session["id"] in sessions:

@@ -291,7 +291,9 @@ def record_day(
     day = {"on": past_day("on", on, now), **stated(who=who, why=why)}
     with _begun_log(study, rater, session, now) as log:
         replay(log.path, log.events)
-        log.append("day-correction", day)
+        before = [e.fields for e in log.events if e.kind == "day-correction"]
+        if day not in before[-1:]:  # what a process died after is in the log already
+            log.append("day-correction", day)
         log_interval(study, protocol, rater, session, log)
     for each in protocol.sessions:
         if each.after == session and study.log_file(rater, each.id).is_file():

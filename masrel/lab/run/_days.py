@@ -44,7 +44,10 @@ def _own_day(events: Sequence[Event]) -> str | None:
 def log_interval(
     study: StudyPaths, protocol: Protocol, rater: str, session: str, log: SessionLog
 ) -> None:
-    """Log the days before a session that has been, and cannot be refused any more."""
+    """Log the days before a session that has been, and cannot be refused any more.
+
+    What the log says last is not said again.
+    """
     sessions = tuple(
         msgspec.structs.replace(each, order_policy="warn") for each in protocol.sessions
     )
@@ -53,7 +56,8 @@ def log_interval(
     day = datetime.fromisoformat(began).astimezone().date()
     noon = datetime.combine(day, time(12))
     interval = interval_fields(study, lenient, rater, session, lambda: noon)
-    if interval is not None:
+    before = [e.fields for e in log.events if e.kind == "interval"]
+    if interval is not None and interval not in before[-1:]:
         log.append("interval", interval)
 
 

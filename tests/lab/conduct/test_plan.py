@@ -113,6 +113,8 @@ def test_an_amendment_needs_a_draw_and_a_change(tmp_path: Path) -> None:
 def test_who_joins_after_the_first_draw_is_late_however_many_join(
     study: StudyPaths,
 ) -> None:
+    edit(study.protocol, "seed = 20240", "seed = 20241")  # who is drawn anew is not
+    allot_schedules(study, read_protocol(study.protocol), redraw=True)
     add_raters(study, "R3", "R4", "R5")
     draw(study)
     protocol = read_protocol(study.protocol)

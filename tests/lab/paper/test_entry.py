@@ -265,7 +265,7 @@ def test_a_sheet_is_entered_once_and_into_no_session_of_the_console(
     before = small[0].log_file("R1", "test").read_bytes()
     for again in (file, typed(small, filled(small, "2", "2", "3"), name="b.csv")):
         with pytest.raises(SessionLogError) as caught:
-            enter(small, again)
+            enter(small, again, on=date(2026, 5, 1))  # nor its day
         assert str(caught.value).startswith(
             f"{again}: row 2: needed a presentation that was not entered yet, got "
             "position 1, code "
