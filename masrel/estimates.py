@@ -132,6 +132,8 @@ class Interval:
         replacement; None when nothing was.
     raters_differ : bool
         Whether the model of a credible interval knows how raters differ.
+    prior : str
+        The prior of a posterior that an end rests on, in words; empty for none.
     """
 
     low: float
@@ -149,10 +151,11 @@ class Interval:
     notes: tuple[str, ...] = ()
     reason: str | None = None
     distribution: Distribution | None = field(default=None, compare=False, repr=False)
-    # no repr has these, and no document: `method` says it in words
+    # no repr has these, and no document: `method` or `notes` say it in words
     is_one_sided: bool = field(default=False, repr=False)
     units_are: Literal["left out", "drawn"] | None = field(default=None, repr=False)
     raters_differ: bool = field(default=False, repr=False)
+    prior: str = field(default="", repr=False)
 
     def __str__(self) -> str:
         return _as_text(_interval_lines(self))

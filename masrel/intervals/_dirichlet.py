@@ -168,6 +168,7 @@ def _interval(
         monte_carlo_error=(low[1], high[1]),
         seed=seed,
         is_one_sided=one_sided,
+        prior=prior,
         distribution=Distribution(
             values=0.5 * (ends[:-1] + ends[1:]),
             weights=1.0 / (_SHOWN * widths),

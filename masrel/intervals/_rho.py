@@ -244,6 +244,7 @@ def rho_interval(
         notes=notes,
         distribution=posterior.distribution(),
         is_one_sided=one_sided,
+        prior=prior.description,
     )
 
 
@@ -301,5 +302,6 @@ def extended(problem: IntervalProblem, interval: Interval) -> Interval:
         interval,
         low=min(low, value),
         high=max(high, value),
+        method=f"{interval.method}, {name} end extended to the estimate",
         notes=(note, *interval.notes),
     )

@@ -284,6 +284,7 @@ def table_interval(
         seed=seed,
         notes=notes,
         is_one_sided=one_sided,
+        prior=description,
         distribution=fewer.distribution(
             max(low - width, min(problem.entry.lowest, low)),
             min(high + width, 1.0),

@@ -399,6 +399,7 @@ def _joined(one: Interval | None, other: Interval | None) -> Interval | None:
         high=max(one.high, other.high),
         method=f"{one.method}, joined with {other.method}",
         notes=tuple(dict.fromkeys((*one.notes, *other.notes))),
+        prior=", or ".join(dict.fromkeys((one.prior, other.prior))),
         distribution=None,
     )
 
@@ -406,7 +407,7 @@ def _joined(one: Interval | None, other: Interval | None) -> Interval | None:
 def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     # An estimate of few items is skewed: low where its error is low, too. The posterior
     # knows, but trusts many raters too much where κ is low; halfway covers with either.
-    from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
+    from masrel.intervals._rho import DEFAULT_PRIOR, METHOD, RhoPosterior
 
     posterior = RhoPosterior.of(problem.item_counts(), DEFAULT_PRIOR)
     (high,) = posterior.quantiles(0.5 + 0.5 * problem.level)
@@ -418,7 +419,13 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
         "that is low by chance has a low error, too"
     )
     halfway = 0.5 * (interval.high + high)
-    return replace(interval, high=halfway, notes=(*interval.notes, note))
+    return replace(
+        interval,
+        high=halfway,
+        method=f"{interval.method}, upper end lifted halfway to that of a {METHOD}",
+        notes=(*interval.notes, note),
+        prior=posterior.prior.description,
+    )
 
 
 def _other_items_and_raters(

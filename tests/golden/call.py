@@ -52,7 +52,9 @@ class Stream:
         return sum(self._random() for _ in range(12)) - 6.0
 
 
-NOT_STORED = {"distribution", "is_one_sided", "units_are", "raters_differ"}
+NOT_STORED = {
+    *("distribution", "is_one_sided", "units_are", "raters_differ", "prior"),
+}
 """Fields of an interval that its JSON has not either: its method says them in words."""
 
 
