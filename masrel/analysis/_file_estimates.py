@@ -3,9 +3,10 @@
 In: a `RatingsFile` and how estimates are made. Out: a row for every coefficient.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -511,13 +512,9 @@ def estimate_row(
         notes.append(f"no interval: {why}")
         questions = replace(questions, target=None, convention=None)
         estimate = _estimate(entry, ratings, questions, questions.level)
-    interval, bound = estimate.interval, None
-    if interval is not None and questions.words and entry.chance_corrected:
-        # the lower end of an interval leaves out half of what is outside, a bound all
-        level = _SURE if interval.is_one_sided else _SURE_TWO_SIDED
-        if interval.reason is None and interval.level != level:
-            interval = _estimate(entry, ratings, questions, level).interval or interval
-        bound = interval.low
+    bound = None
+    if questions.words and entry.chance_corrected:
+        bound = lower_bound(estimate, partial(_estimate, entry, ratings, questions))
     return AgreementRow(
         keys=keys,
         title=questions.title(entry),
@@ -526,6 +523,21 @@ def estimate_row(
         lower_bound=bound,
         convention=None if entry.has_interval else questions.convention,
     )
+
+
+def lower_bound(
+    estimate: Estimate, at_level: Callable[[float], Estimate]
+) -> float | None:
+    """Return what the true value reaches with 95 %, by the interval if there is one."""
+    # at_level: the same estimate with an interval of another level; the lower end of an
+    # interval leaves out half of what is outside, a bound all
+    interval = estimate.interval
+    if interval is None:
+        return None
+    level = _SURE if interval.is_one_sided else _SURE_TWO_SIDED
+    if interval.reason is None and interval.level != level:
+        interval = at_level(level).interval or interval
+    return interval.low
 
 
 def _estimate(

@@ -187,7 +187,7 @@ def answer_table(
         shown = [_cells(row, answer.heads, bands, detail) for row in estimates]
         notes += _errors_note(estimates, in_sentences)
         notes += [] if in_sentences else _paired_note(estimates, items)
-        after = [] if bands is None else [_words_note(estimates, bands)]
+        after = [] if bands is None else [words_note(estimates, bands)]
     columns = _columns(answer, shown, bands, items)
     populations = {row.get("population") for row in shown} - {None}
     if detail != "brief" or len(populations) < 2:  # a note, or the sentence, says it
@@ -292,7 +292,7 @@ def answer_documents(
         {
             **row.keys,
             **as_document(row.estimate),
-            **({} if bands is None else {"word": _word(row, bands)}),
+            **({} if bands is None else {"word": word_of(row, bands)}),
             "notes": [*row.notes, *_why_null(row.estimate)],
         }
         for row in answer.estimates
@@ -327,7 +327,7 @@ def _cells(
         "title": row.title,
         "group": row.group,
         "standard_error": None if has_none else estimate.standard_error,
-        "words": None if bands is None else _word(row, bands),
+        "words": None if bands is None else word_of(row, bands),
         "texts": [*undefined, *row.notes],
         "interval_texts": None,
     }
@@ -352,7 +352,7 @@ def _of_detail(notes: Sequence[str], detail: Detail) -> list[str]:
     return list(filter(None, by_detail[detail]))
 
 
-def _word(row: AgreementRow, bands: BandScale) -> str | None:
+def word_of(row: AgreementRow, bands: BandScale) -> str | None:
     """Return the best word that the true value reaches with 95 % probability."""
     estimate = row.estimate
     entry = COEFFICIENTS.get(estimate.coefficient)  # none of kappa of a category
@@ -414,8 +414,9 @@ def _interval_note(interval: Interval, detail: Detail) -> str:
     return name + to
 
 
-def _words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
-    named = [row for row in rows if _word(row, bands) is not None]
+def words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
+    """Say what the words for values are, and by what law."""
+    named = [row for row in rows if word_of(row, bands) is not None]
     bounded = [row for row in named if row.lower_bound is not None]
     laws = ["its interval (one-sided)"] if bounded else []
     if len(bounded) < len(named):
@@ -438,7 +439,10 @@ def agreement_sentences(
     lines = []
     for row in answer.estimates:
         earned = ""
-        if bands is not None and (word := _word(row, bands)) not in (None, "undefined"):
+        if bands is not None and (word := word_of(row, bands)) not in (
+            None,
+            "undefined",
+        ):
             earned = f"at least {word} after {_SOURCES[bands]}"
         group = "".join(f"{capital(by)} {row.group}: " for by in answer.heads.values())
         lines.append(

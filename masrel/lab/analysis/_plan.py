@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
+import msgspec
+
 import masrel
 from masrel.agreement import coefficient, cohen_kappa
 from masrel.errors import (
@@ -195,6 +197,16 @@ def _planned(
     if reason is not None:
         return PlannedEstimate(line=line, reason=reason)
     return compute(line, protocol, ratings, models)
+
+
+def with_level(
+    planned: PlannedEstimate, protocol: Protocol, ratings: Ratings, level: float
+) -> PlannedEstimate:
+    """Return a line of the plan once more, its intervals of another level."""
+    analysis = msgspec.structs.replace(protocol.analysis, level=level)
+    protocol = msgspec.structs.replace(protocol, analysis=analysis)
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
+        return _planned(planned.line, protocol, ratings)
 
 
 def unanswered(line: EstimatePlan, protocol: Protocol) -> str | None:

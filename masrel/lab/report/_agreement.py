@@ -13,11 +13,13 @@ from operator import attrgetter
 
 import numpy as np
 
-from masrel.agreement import category_kappa, code_ratings, strength
+from masrel.agreement import COEFFICIENTS, BandScale, category_kappa, code_ratings
+from masrel.analysis._file_estimates import AgreementRow, lower_bound
 from masrel.errors import MasrelWarning
 from masrel.estimates import Estimate, Interval
 from masrel.intervals.diagnosis import _category_arrays
 from masrel.lab.analysis import PlannedEstimate
+from masrel.lab.analysis._plan import with_level
 from masrel.lab.ratings import Ratings, rating_matrix
 from masrel.lab.report._material import (
     MANY_RATERS,
@@ -33,6 +35,7 @@ from masrel.lab.report._material import (
 )
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import FOREST, Drawn, ForestRow
+from masrel.tables._answer_tables import word_of, words_note
 from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import (
     Column,
@@ -49,11 +52,7 @@ _AGREEMENTS = (
     "coefficient takes none off."
 )
 
-_LANDIS_KOCH = (
-    "Words after Landis JR, Koch GG (1977). The measurement of observer agreement "
-    "for categorical data. Biometrics 33(1), 159-174, doi 10.2307/2529310; they name "
-    "the point estimate alone."
-)
+_BANDS: BandScale = "landis_koch"
 
 _COLUMNS = (
     Column(key="id", heading="Estimate", align="left"),
@@ -69,7 +68,7 @@ _COLUMNS = (
     Column(key="high", heading="High", digits=3, where="csv"),
     Column(key="interval", heading="Interval", where="csv"),
     Column(key="target", heading="Generalises to", where="csv"),
-    Column(key="strength", heading="Strength", align="left"),
+    Column(key="strength", heading="At least", align="left"),
     Column(key="observed", heading="p_o", digits=3),
     Column(key="chance", heading="p_e", digits=3),
     Column(key="reason", heading="Reason", where="csv"),
@@ -97,7 +96,7 @@ def estimates_section(material: Material, *, kind: str) -> Iterator[Content]:
             text = f"{entry.line.id} is not in these data: {entry.reason}."
             yield Paragraph(text=text, absent=True)
         return
-    every = estimate_rows(planned)
+    every = estimate_rows(material, planned)
     rows = _few_of_many(every)
     yield _estimate_table(every, rows, name=name, caption=caption, data=material.data)
     intervals = [row.interval for row in rows if row.interval is not None]
@@ -119,33 +118,55 @@ class EstimateRow:
     interval: Interval | None  # of the estimate
     reason: str | None  # why there is none
     single: bool  # whether it is one rater's agreement with him- or herself
+    earned: AgreementRow | None  # what the best word that it reaches is known from
 
 
-def estimate_rows(planned: Sequence[PlannedEstimate]) -> list[EstimateRow]:
+def estimate_rows(
+    material: Material, planned: Sequence[PlannedEstimate]
+) -> list[EstimateRow]:
     """Return the rows of planned estimates, each followed by those of its raters."""
-    rows = []
-    for entry in planned:
-        line = entry.line
-        estimates: list[tuple[str, str, Estimate | None]] = [
-            (f"{line.id}: {r.rater}", r.estimate.coefficient, r.estimate)
-            for r in entry.by_rater
-        ]
-        if entry.estimate is not None or not entry.by_rater:
-            estimates.insert(0, (line.id, line.coefficient, entry.estimate))
-        rows += [
-            EstimateRow(
-                name=name,
-                coefficient=coefficient_name(coefficient, line.weights),
-                models=line.models,
-                sessions=" and ".join(line.sessions),
-                estimate=estimate,
-                interval=None if estimate is None else estimate.interval,
-                reason=entry.reason if name == line.id else None,
-                single=name != line.id,
-            )
-            for name, coefficient, estimate in estimates
-        ]
-    return rows
+    return [
+        EstimateRow(
+            name=name,
+            coefficient=coefficient_name(coefficient, entry.line.weights),
+            models=entry.line.models,
+            sessions=" and ".join(entry.line.sessions),
+            estimate=estimate,
+            interval=None if estimate is None else estimate.interval,
+            reason=entry.reason if name == entry.line.id else None,
+            single=name != entry.line.id,
+            earned=_earned(material, entry, nth, estimate),
+        )
+        for entry in planned
+        for nth, (name, coefficient, estimate) in enumerate(_estimates(entry))
+    ]
+
+
+def _estimates(entry: PlannedEstimate) -> list[tuple[str, str, Estimate | None]]:
+    # name, coefficient and estimate: of all raters, then of each alone
+    line = entry.line
+    of_all = (line.id, line.coefficient, entry.estimate)
+    return [of_all] * (entry.estimate is not None or not entry.by_rater) + [
+        (f"{line.id}: {each.rater}", each.estimate.coefficient, each.estimate)
+        for each in entry.by_rater
+    ]
+
+
+def _earned(
+    material: Material, entry: PlannedEstimate, nth: int, estimate: Estimate | None
+) -> AgreementRow | None:
+    if estimate is None:
+        return None
+
+    def at_level(level: float) -> Estimate:
+        ratings = material.ratings.without(material.analysis.excluded)
+        again = with_level(entry, material.protocol, ratings, level)
+        return _estimates(again)[nth][2] or estimate
+
+    is_raw = not COEFFICIENTS[estimate.coefficient].chance_corrected
+    bound = None if is_raw else lower_bound(estimate, at_level)
+    title = coefficient_name(estimate.coefficient)
+    return AgreementRow(keys={}, title=title, estimate=estimate, lower_bound=bound)
 
 
 def _few_of_many(rows: Sequence[EstimateRow]) -> list[EstimateRow]:
@@ -205,9 +226,9 @@ def _estimate_table(
     ]
     if any(row.estimate is not None for row in rows):
         notes.append(_AGREEMENTS)
-    strengths = [column.key for column in _COLUMNS].index("strength")
-    if any(row[strengths] is not None for row in cells):
-        notes.append(_LANDIS_KOCH)
+    earned = [row.earned for row in rows if row.earned is not None]
+    if any(word_of(row, _BANDS) for row in earned):
+        notes.append(words_note(earned, _BANDS))
     if len(rows) < len(every):
         notes.append("Of many raters, five by their value; the file has all.")
     return Table(
@@ -233,7 +254,7 @@ def _cells(row: EstimateRow, mark: str) -> tuple[Value, ...]:
         text = f"{interval_text(interval.low, interval.high)} {mark}"
         words = interval_name(interval), TARGETS[interval.target]
         ends = (text, interval.low, interval.high, *words)
-    has_word = estimate.coefficient.endswith("kappa") and math.isfinite(estimate.value)
+    word = None if row.earned is None else word_of(row.earned, _BANDS)
     return (
         *head,
         f"{estimate.n_items} {row.models}",
@@ -243,7 +264,7 @@ def _cells(row: EstimateRow, mark: str) -> tuple[Value, ...]:
         1 if row.single else estimate.n_raters,
         estimate.value,
         *ends,
-        strength(estimate.value) if has_word else None,
+        word,
         estimate.observed,
         estimate.chance,
         estimate.reason,

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 
+from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import Analysis, PlannedEstimate
 from masrel.lab.protocol import EstimatePlan, report_sections, scale_of
@@ -227,7 +228,7 @@ def _statistics(material: Material, used: list[str]) -> Iterator[str]:
         yield sentence("methods", "missing", missing=text)
     if analysis.excluded:
         yield _excluded_text("methods", analysis.excluded)
-    if any(estimate.coefficient.endswith("kappa") for _, estimate in estimates):
+    if any(COEFFICIENTS[of.coefficient].chance_corrected for _, of in estimates):
         yield sentence("methods", "strength", reference=_cite(["landis1977"], used))
     of_sections = [*_of_sections(material, used)]
     yield from of_sections

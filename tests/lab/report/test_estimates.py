@@ -154,9 +154,9 @@ def test_the_csv_has_every_number_and_the_page_one_interval(tmp_path: Path) -> N
     ((head, row), (cells,), text) = shown(tmp_path, one(interval=interval()))
     assert head == [
         "Estimate", "Coefficient", "Models", "Session", "Raters", "Value", "Interval",
-        "Strength", "p_o", "p_e",
+        "At least", "p_o", "p_e",
     ]  # fmt: skip
-    assert row[5:8] == ["0.626", "[0.320, 0.933] ᵃ", "substantial"]
+    assert row[5:8] == ["0.626", "[0.320, 0.933] ᵃ", "fair"]
     assert "ᵃ 95 % confidence, jackknife, t(7); generalises to other raters." in text
     expected = {"value": "0.626083678854127", "low": "0.31957", "high": "0.93252"}
     expected |= {"interval": "95 % confidence, jackknife, t(7)", "n_items": "4"}
@@ -186,7 +186,7 @@ def test_what_a_reader_must_know_is_below_the_table(tmp_path: Path) -> None:
     (_, *rows), cells, text = shown(tmp_path, nan, lost, warned, share)
     assert [row[5] for row in rows] == ["undefined", "–", "0.626", "0.626"]
     words = [row["strength"] for row in cells]
-    assert words == ["", "", "substantial", ""]  # of a kappa that has a value
+    assert words == ["", "", "fair", ""]  # of a kappa that has a value
     assert rows[1][6] == "not in these data"
     assert (cells[1]["reason"], cells[1]["value"]) == ("there are no ratings", "")
     assert rows[3][1] == "Percent agreement (0–1)"

@@ -232,6 +232,10 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
         ["| 0 | 0 | – | – | – | – |",
          "The intervals are wide, as they rest on 4 models."],
     ),
+    "the word that agree has for it, whose interval ends in 'fair'": (
+        study(plan(interval="posterior", target="items"), sections=("agreement",)),
+        table_v(), ["| [0.370, 0.874] ᵃ | moderate |", "by its interval (one-sided)"],
+    ),
     "no estimate, so no grade": (
         study(sections=("categories",)), table_v(),
         ["Not in these data: the plan asks for no estimate of agreement between"],
