@@ -61,25 +61,31 @@ def write_file(
 
 
 def write_files(
-    contents: Mapping[Path, bytes | str],
+    contents: Mapping[Path, bytes | str | None],
     *,
     within: Path | None = None,
     mode: int | None = None,
 ) -> None:
     """Write files that belong together: all on disk before the first has its name."""
-    # They get their names in this order. Text is UTF-8 with lines as they are. mode:
-    # permissions; unless given those of the file that is replaced, or its owner's alone
-    # where a study has what is private, or the usual ones
+    # They get their names, or go where there is None, in this order. Text is UTF-8 with
+    # lines as they are. mode: permissions; unless given those of what is replaced, or
+    # its owner's alone where a study has what is private, or the usual ones
     parts: dict[Path, Path] = {}
     try:
         for path, data in contents.items():
+            if data is None:
+                continue
             parts[path], descriptor = new_part(path, within, mode)
             with on_disk(path, descriptor) as out:
                 out.write(data.encode() if isinstance(data, str) else data)
         for path in contents:
             with naming(path):
-                os.replace(parts[path], path)
-            del parts[path]
+                if path in parts:
+                    os.replace(parts[path], path)
+                    del parts[path]
+                else:
+                    path.unlink(missing_ok=True)
+                    sync_folder(path.parent)  # it is gone before what follows is there
     finally:
         for part in parts.values():
             part.unlink(missing_ok=True)

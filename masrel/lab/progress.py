@@ -16,7 +16,7 @@ from typing import Literal
 
 from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event, events_before_torn, utc_now
-from masrel.lab._study_files import table_csv
+from masrel.lab._study_files import MANIFEST, table_csv
 from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
 from masrel.lab.conduct._study_log import events_of_logs
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
@@ -489,7 +489,7 @@ def _to_await(root: str, open_: Sequence[SessionProgress]) -> NextStep | None:
 def _to_make(study: StudyPaths, root: str) -> NextStep:
     # of sessions that are complete: each output is made after what it is made of
     logs = [*study.logs(), *study.conduct_logs()]
-    manifest = study.report / "manifest.json"
+    manifest = study.report / MANIFEST
     newest = max((log.stat().st_mtime_ns for log in logs), default=0)
     for verb, file in (("ratings", study.ratings_file), ("report", manifest)):
         made = file.stat().st_mtime_ns if file.exists() else -1

@@ -16,7 +16,13 @@ from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, p_value
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
-from masrel.lab._study_files import MAX_TABLE, parse_json, read_regular
+from masrel.lab._study_files import (
+    CUT_OFF,
+    MAX_TABLE,
+    is_cut_off,
+    parse_json,
+    read_regular,
+)
 from masrel.lab.analysis._results import ANALYSIS_FORMAT, Analysis, PlannedEstimate
 from masrel.lab.protocol import Gate
 
@@ -25,6 +31,8 @@ _LEFT_OUT = ("format", "inputs", "masrel_version", "notes")
 # Fields that tell the elements of a list apart
 _NAMES = ("id", "questionnaire", "question", "session", "model", "rater", "name",
           "label", "stretch")  # fmt: skip
+
+_ROUNDING = 1e-9  # of a number
 
 # Parts of a place that say nothing beside the name of a line of the plan
 _WITHIN = ("estimates", "estimate", "interval")
@@ -125,6 +133,8 @@ def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]
             f"{option}: needs an analysis.json, or a folder that has one, as that of a "
             f"report or a study, got {place}"
         )
+    if is_cut_off(file.parent):
+        raise ParameterError(f"{option}: {file.parent}: {CUT_OFF}")
     try:
         document = parse_json(read_regular(file, most=MAX_TABLE))
     except ValueError as error:
@@ -147,11 +157,17 @@ def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]
 
 
 def changes_between(
-    old: Mapping[str, Any], new: Mapping[str, Any]
+    old: Mapping[str, Any], new: Mapping[str, Any], *, exact: bool = False
 ) -> list[dict[str, Any]]:
     """Return every value that two analyses do not have in common, and by how much."""
+    # exact: also numbers that differ as rounding on another machine does
     before, after = dict(_values(old)), dict(_values(new))
-    places = (p for p in {**after, **before} if before.get(p) != after.get(p))
+    places = (
+        place
+        for place in {**after, **before}
+        if before.get(place) != after.get(place)
+        and (exact or not _is_rounding(before.get(place), after.get(place)))
+    )
     changes = dict.fromkeys(  # once where an estimate repeats what its line says
         (
             " ".join(p for p in place[:-1] if p not in _WITHIN).replace("_", " "),
@@ -171,6 +187,13 @@ def changes_between(
         }
         for of, field, one, other in changes
     ]
+
+
+def _is_rounding(old: str | float | None, new: str | float | None) -> bool:
+    numbers = [of for of in (old, new) if isinstance(of, float)]
+    return len(numbers) == 2 and math.isclose(
+        *numbers, rel_tol=_ROUNDING, abs_tol=1e-12
+    )
 
 
 def _difference(old: str | float | None, new: str | float | None) -> float | None:
@@ -214,6 +237,9 @@ def _values(
             met[name] += 1
             which = f"{name} ({met[name]})" if met[name] > 1 else name
             yield from _values(part, (*place, which))
+    elif isinstance(value, list) and any(isinstance(part, float) for part in value):
+        for at, part in enumerate(value, 1):
+            yield (*place[:-1], f"{place[-1]} {at}"), part
     elif isinstance(value, list):
         yield place, ", ".join(map(str, value))
     else:

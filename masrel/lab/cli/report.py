@@ -23,11 +23,18 @@ from masrel.cli._options import (
     write_json,
 )
 from masrel.errors import ParameterError
-from masrel.lab._study_files import MAX_TABLE, parse_json, read_once, read_regular
+from masrel.lab._study_files import (
+    CUT_OFF,
+    MANIFEST,
+    MAX_TABLE,
+    is_cut_off,
+    parse_json,
+    read_once,
+    read_regular,
+)
 from masrel.lab.cli._gating import GateOptions, conclude, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 from masrel.lab.report._report_folder import (
-    MANIFEST,
     NOTES,
     NUMBERS,
     keep_shown,
@@ -42,7 +49,8 @@ FORMATS = ("html", "markdown", "latex", "docx")
 _LONGEST = 40  # letters of a text in a cell
 # They change nothing that is made or said
 _OTHER_OPTIONS = (
-    *("cache_folder", "check", "junit", "quiet", "json_file", "against", "no_change"),
+    *("cache_folder", "check", "junit", "quiet", "json_file"),
+    *("against", "no_change", "exact"),
 )
 
 
@@ -52,10 +60,15 @@ class _CompareOptions:
 
     against: Path | None
     no_change: bool
+    exact: bool
 
     def __post_init__(self) -> None:
-        if self.no_change and self.against is None:
-            raise ParameterError("--no-change: needs --against, the report to compare")
+        for name in ("no_change", "exact"):
+            if getattr(self, name) and self.against is None:
+                option = f"--{name.replace('_', '-')}"
+                raise ParameterError(
+                    f"{option}: needs --against, the report to compare"
+                )
 
     def read(self, study: Path) -> dict[str, Any] | None:
         """Return the older analysis of a study; None if nothing is to be compared."""
@@ -75,7 +88,8 @@ class _CompareOptions:
         from masrel.lab.analysis._comparison import changed_inputs, changes_between
         from masrel.tables._tables import Column, as_text, table_of
 
-        changes, inputs = changes_between(old, new), changed_inputs(old, new)
+        changes = changes_between(old, new, exact=self.exact)
+        inputs = changed_inputs(old, new)
         if shows and changes:
             table = table_of(
                 "changes",
@@ -128,6 +142,13 @@ _compare_options = grouped(
         "--no-change",
         is_flag=True,
         help="With --against: exit with 1 if a number has changed.",
+    ),
+    click.option(
+        "--exact",
+        is_flag=True,
+        help="With --against: to the last digit. Otherwise numbers that differ by no "
+        "more than 1e-9 of their size, or 1e-12, are the same: so much is rounding, "
+        "which other processors and libraries do in another way.",
     ),
 )
 
@@ -219,6 +240,8 @@ def report(
         echo_notes(shown["notes"])
         numbers = read_regular(folder / NUMBERS, most=MAX_TABLE)
     else:
+        cut_off = f"note: {folder}: {CUT_OFF}\n" * is_cut_off(folder)
+        click.echo(cut_off, err=True, nl=False)
         files, shown = _made(
             study, ratings_file, only, formats, gating, include, output
         )

@@ -16,8 +16,11 @@ from typing import Any
 from masrel._input import check_option, listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import (
+    CUT_OFF,
+    MANIFEST,
     MAX_SMALL,
     csv_text,
+    is_cut_off,
     parse_json,
     read_regular,
     toml_lines,
@@ -143,7 +146,9 @@ def gather_dataset(
 
 def _shown_in_report(paths: StudyPaths) -> list[str]:
     # what a report names though it is private, by the names of an export
-    manifest = paths.report / "manifest.json"
+    manifest = paths.report / MANIFEST
+    if is_cut_off(paths.report):
+        raise ParameterError(f"{paths.report}: {CUT_OFF}")
     if not manifest.is_file():
         return []
     try:

@@ -10,10 +10,12 @@ import warnings
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 from masrel.errors import MissingLettersWarning
+from masrel.lab._study_files import MANIFEST
 from masrel.lab.analysis import Analysis
 from masrel.lab.analysis._results import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
@@ -32,13 +34,7 @@ from masrel.lab.report._material import Material, gather, lacking
 from masrel.lab.report._order_tables import order_section
 from masrel.lab.report._pages import CONVERTED, WRITERS, pandoc_version
 from masrel.lab.report._paragraphs import methods_section, result_text
-from masrel.lab.report._report_folder import (
-    MANIFEST,
-    NUMBERS,
-    asset_name,
-    replace_report,
-    report_files,
-)
+from masrel.lab.report._report_folder import NUMBERS, replace_report, report_files
 from masrel.lab.report._trace_section import speeds_section, traces_section
 from masrel.lab.verification import Anchor
 from masrel.pages._sections import (
@@ -116,7 +112,7 @@ class ReportFiles:
     manifest : Path
         The hash of every file, as JSON.
     tables : tuple of Path
-        One CSV per table; its name ends in a hyphen and the start of its SHA-256.
+        One CSV per table; a number is added to a name that there is already.
     figures : tuple of Path
         A PNG and an SVG per figure, named like tables.
     """
@@ -285,7 +281,7 @@ def _block(
     # as it is shown; files of tables and figures go to the assets
     if isinstance(content, Table):
         data = as_csv(content, raw=raw_csv).encode()
-        assets[asset_name("tables", content.name, "csv", data)] = data
+        assets[_new_place(assets, f"tables/{content.name}", "csv")] = data
     if not isinstance(content, Drawing):
         return Block(number=number, content=content)
     drawn = draw(content.content, stamp=content.stamp)
@@ -293,8 +289,13 @@ def _block(
         progress(content.name)
     pictures = {str(form): picture for form, picture in drawn.items()}
     files = {
-        form: asset_name("figures", content.name, form, picture)
-        for form, picture in pictures.items()
+        form: _new_place(assets, f"figures/{content.name}", form) for form in pictures
     }
     assets.update({files[form]: picture for form, picture in pictures.items()})
     return Block(number=number, content=content, pictures=pictures, files=files)
+
+
+def _new_place(assets: Collection[str], name: str, form: str) -> str:
+    # of a file whose name no other has, such as that of another session's table
+    names = (f"{name}{f'_{n}' * (n > 1)}.{form}" for n in count(1))
+    return next(place for place in names if place not in assets)

@@ -1,9 +1,9 @@
-"""The folder of a report, whose pages are whole at any moment, and when it is current.
+"""The folder of a report: whole while it has a manifest, and made when not current.
 
-Tables and figures have the start of their hash in their names, so that those of a new
-report never take the place of those that a page still shows. They are on disk before
-the first page is replaced; the manifest names them all; then those go that it does not
-name, also of a report that was never finished. What else is in the folder stays.
+The manifest names every file with its hash. It goes before the first file is replaced
+and comes after the last: a report without it was cut off. Meanwhile a list of all that
+the reports before and the new one name stands in its place, so that the next build
+knows what to remove. What else is in the folder stays.
 
 A report is current if it was made by the same call, of the same files, by the same
 code: a note in a folder of the study has their hash. Nothing heavy is loaded for it.
@@ -21,31 +21,26 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from masrel._files import (
-    make_folder,
-    refuse_record,
-    sync_folder,
-    write_file,
-    write_files,
-)
+from masrel._files import make_folder, refuse_record, write_file, write_files
 from masrel.errors import ParameterError
-from masrel.lab._study_files import MAX_TABLE, read_regular, regular
+from masrel.lab._study_files import (
+    MANIFEST,
+    MAX_TABLE,
+    UNFINISHED,
+    read_regular,
+    regular,
+)
 
 if sys.platform != "win32":
     import fcntl
 
-MANIFEST = "manifest.json"
 NUMBERS = "analysis.json"
 
-_N_HEX = 16  # of a hash in a name
-_ASSET_FOLDERS = ("tables", "figures")
-_PAGES = ("report.html", "report.md", "report.tex", "report.docx")
-_ASSET = re.compile(r"(?:tables|figures)/[\w.-]+-([0-9a-f]{16})\.(?:csv|png|svg)")
-
-
-def asset_name(folder: str, name: str, form: str, data: bytes) -> str:
-    """Return the name of a table or a figure, from the report's folder."""
-    return f"{folder}/{name}-{_hash(data)[:_N_HEX]}.{form}"
+# What a build writes and may remove: pages and what stands beside them
+_OWN = re.compile(
+    r"report\.(?:html|md|tex|docx)|references\.bib"
+    r"|(tables|figures)/[\w.-]+\.(?:csv|png|svg)"
+)
 
 
 def report_files(
@@ -78,16 +73,21 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
             refuse_record(folder / name)
     with _alone(folder):
         changed, stale = report_changes(folder, files)
-        new = {folder / place: files[place] for place in changed}
-        assets = {path: data for path, data in new.items() if path.parent != folder}
-        write_files(assets, within=folder)
-        for path, data in new.items():  # the pages, and the manifest last
-            if path not in assets:
-                write_files({path: data}, within=folder)
-        for path in stale:
-            path.unlink()
-        for parent in dict.fromkeys(path.parent for path in stale):
-            sync_folder(parent)
+        if not changed and not stale and not (folder / UNFINISHED).exists():
+            return
+        known = _known_files(folder)
+        for place, data in files.items():
+            known.setdefault(place, []).append(_hash(data))
+        own = json.dumps({"format": 1, "files": known}, indent=1)
+        contents: dict[Path, bytes | None] = {
+            folder / UNFINISHED: own.encode(),
+            folder / MANIFEST: None,
+            **{folder / place: files[place] for place in changed if place != MANIFEST},
+            **dict.fromkeys(stale),
+        }
+        write_files(contents, within=folder)
+        manifest = {folder / MANIFEST: files[MANIFEST], folder / UNFINISHED: None}
+        write_files(manifest, within=folder)
 
 
 @contextmanager
@@ -109,8 +109,7 @@ def report_changes(
     folder: Path, files: Mapping[str, bytes]
 ) -> tuple[list[str], list[Path]]:
     """Return files that a folder lacks, and those in it of a report before."""
-    hashes = ((place, _hash(data)) for place, data in files.items())
-    changed = [place for place, digest in hashes if _differs(folder / place, digest)]
+    changed = [n for n, data in files.items() if _differs(folder / n, {_hash(data)})]
     return changed, [*_stale_files(folder, files)]
 
 
@@ -118,36 +117,36 @@ def _hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _differs(path: Path, digest: str) -> bool:
-    return path.is_symlink() or file_hash(str(path)) != digest
+def _differs(path: Path, hashes: Collection[str]) -> bool:
+    return path.is_symlink() or file_hash(str(path)) not in hashes
 
 
-def _hashes_in(folder: Path) -> dict[str, str]:
-    # what its manifest says of the files of a report; nothing if there is none
-    try:
-        document = json.loads(read_regular(folder / MANIFEST, most=MAX_TABLE))
-    except (OSError, ValueError):
-        return {}
-    files = document.get("files") if isinstance(document, dict) else None
-    pairs = files.items() if isinstance(files, dict) else ()
-    return {name: digest for name, digest in pairs if isinstance(digest, str)}
+def _known_files(folder: Path) -> dict[str, list[str]]:
+    # hashes that the files of a report have, or had when one was cut off, by what the
+    # manifest and the list say; nothing if there is none
+    known: dict[str, list[str]] = {}
+    for name in (MANIFEST, UNFINISHED):
+        with contextlib.suppress(*_UNREADABLE):
+            document = json.loads(read_regular(folder / name, most=MAX_TABLE))
+            for place, hashes in document["files"].items():
+                known.setdefault(place, []).extend(
+                    [hashes] if isinstance(hashes, str) else map(str, hashes)
+                )
+    return known
+
+
+_UNREADABLE = (OSError, ValueError, LookupError, TypeError, AttributeError)
 
 
 def _stale_files(folder: Path, named: Collection[str]) -> Iterator[Path]:
-    # tables, figures and pages of a report before, which this one does not name; only
-    # if nobody has written in them since: a name, or the manifest, has their hash
-    for name in _ASSET_FOLDERS:
-        inside = () if (folder / name).is_symlink() else (folder / name).glob("*")
-        for path in sorted(inside):
-            place = f"{name}/{path.name}"
-            asset = _ASSET.fullmatch(place)
-            if asset is None or place in named or path.is_symlink():
-                continue
-            if (file_hash(str(path)) or "").startswith(asset[1]):
-                yield path
-    for name, digest in _hashes_in(folder).items():
-        if name in _PAGES and name not in named and not _differs(folder / name, digest):
-            yield folder / name
+    # files of a report before, which this one does not name; only if nobody has written
+    # in them since
+    for place, hashes in _known_files(folder).items():
+        own = _OWN.fullmatch(place)
+        if own is None or place in named or (own[1] and (folder / own[1]).is_symlink()):
+            continue
+        if not _differs(folder / place, hashes):
+            yield folder / place
 
 
 def file_hash(path: str) -> str | None:
@@ -261,6 +260,6 @@ def _is_whole(folder: Path, manifest: str) -> bool:
     # Whether a report is there as it was written, and nothing that a build would remove
     if file_hash(str(folder / MANIFEST)) != manifest:
         return False
-    hashes = _hashes_in(folder)
-    differ = (_differs(folder / name, digest) for name, digest in hashes.items())
-    return not any(differ) and not any(_stale_files(folder, hashes))
+    known = _known_files(folder)
+    differ = (_differs(folder / name, hashes) for name, hashes in known.items())
+    return not any(differ) and not (folder / UNFINISHED).exists()

@@ -13,9 +13,12 @@ import masrel
 from masrel.errors import MasrelError, MasrelWarning, ProtocolError, SessionLogError
 from masrel.lab._event_log import read_log
 from masrel.lab._study_files import (
+    CUT_OFF,
+    MANIFEST,
     MAX_RECORDING,
     MAX_TABLE,
     format_problem,
+    is_cut_off,
     leaves,
     parse_json,
     read_once,
@@ -50,7 +53,8 @@ if TYPE_CHECKING:
     from masrel.lab.analysis import Analysis
     from masrel.lab.ratings import Ratings
 
-_REPORT_FORMAT = "masrel report 1"  # what the manifest of a report says its format is
+_REPORT_FORMAT = "masrel report 2"  # what the manifest of a report says its format is
+_HASHED_NAMES = "masrel report 1"  # whose tables and figures have hashes in their names
 
 _SHOWN = 20  # differences of the table that are listed
 
@@ -241,7 +245,9 @@ def _of_logs(
 
 def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     # of everything that was made from the logs
-    table, manifest = study.ratings_file, study.report / "manifest.json"
+    if is_cut_off(study.report):
+        yield stale(study.report, CUT_OFF)
+    table, manifest = study.ratings_file, study.report / MANIFEST
     tables = (table, study.answers_file, study.raters_file)
     outputs = (*tables, study.analysis_file, manifest)
     files = [file for file in outputs if file.is_file()]
@@ -383,9 +389,15 @@ def _report_findings(
     if document is None or not isinstance(files, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
         return
-    if document.get("format") != _REPORT_FORMAT:
-        got = document.get("format")
-        yield broken(manifest, f"needed format {_REPORT_FORMAT!r}, got {got!r}")
+    if (of_format := document.get("format")) == _HASHED_NAMES:
+        yield stale(
+            manifest,
+            "names of tables and figures have hashes, as earlier versions of masrel "
+            "made them: make anew for names that last",
+        )
+    elif of_format != _REPORT_FORMAT:
+        needed = f"needed format {_REPORT_FORMAT!r}, got {of_format!r}"
+        yield broken(manifest, needed)
         return
     numbers = manifest.with_name("analysis.json")
     made = _document(numbers) if numbers.is_file() else None

@@ -105,6 +105,21 @@ def test_a_change_fails_if_asked_to(
     assert (after != before) is writes
 
 
+def test_rounding_is_no_change_unless_it_is_asked_for(
+    masrel: Caller, study: Path, tmp_path: Path
+) -> None:
+    old = Path(shutil.copytree(study / "report", tmp_path / "old"))
+    numbers = old / "analysis.json"
+    analysis = json.loads(numbers.read_text("utf-8"))
+    estimate = analysis["estimates"][0]["estimate"]
+    against, value = ("--against", old, "--no-change"), estimate["value"]
+    for part, codes in ((1e-15, (0, 1)), (0.9e-9, (0, 1)), (1.1e-9, (1, 1))):
+        estimate["value"] = value * (1.0 + part)
+        numbers.write_text(json.dumps(analysis), "utf-8")
+        done = [masrel("report", study, *against, *e).code for e in ((), ("--exact",))]
+        assert tuple(done) == codes, part
+
+
 def test_an_estimate_that_is_new_or_gone_is_a_change(
     masrel: Caller, study: Path
 ) -> None:

@@ -1,10 +1,12 @@
 """A report is made anew where something has changed, and nowhere else."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -181,10 +183,55 @@ def test_a_file_of_the_report_is_made_good_and_one_that_nobody_links_to_goes(
         assert masrel("report", study).code == 0
         assert contents(folder) == before
     (folder / "manifest.json").write_bytes(b"spoilt")
-    (folder / "tables/old-ba7816bf8f01cfea.csv").write_bytes(b"abc")
-    (folder / "tables/mine.csv").write_bytes(b"abc")
     assert masrel("report", study).code == 0
-    assert contents(folder) == before | {"tables/mine.csv": b"abc"}
+    assert contents(folder) == before
+
+
+def test_what_a_report_left_goes_and_what_is_not_its_own_stays(
+    masrel: Caller, study: Path
+) -> None:
+    # as an earlier version made it, with hashes in names
+    masrel("report", study)
+    folder = study / "report"
+    before = contents(folder)
+    digest, others = sha256(b"abc").hexdigest(), ("edited", "mine")
+    names = {name: f"tables/{name}-{digest[:16]}.csv" for name in ("old", *others)}
+    for name in names.values():
+        (folder / name).write_bytes(b"abc")
+    (folder / names["edited"]).write_bytes(b"abcd")
+    (study / "outside.csv").write_bytes(b"abc")
+    manifest = json.loads((folder / "manifest.json").read_bytes())
+    manifest["format"] = "masrel report 1"
+    of_old = dict.fromkeys((names["old"], names["edited"], "../outside.csv"), digest)
+    manifest["files"] |= of_old
+    (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    done = masrel("report", study, "--check")
+    assert f"{folder / names['old']}: would go\n" in done.out
+    assert masrel("report", study).code == 0
+    stays = {names["edited"]: b"abcd", names["mine"]: b"abc"}
+    assert contents(folder) == before | stays
+    assert (study / "outside.csv").exists()
+
+
+def test_a_report_that_was_cut_off_is_called_so_until_it_is_made_anew(
+    masrel: Caller, study: Path
+) -> None:
+    masrel("report", study)
+    folder = study / "report"
+    before = contents(folder)
+    (folder / "unfinished.json").write_bytes((folder / "manifest.json").read_bytes())
+    (folder / "manifest.json").unlink()
+    said = f"{folder}: was cut off while it was made; masrel report makes it anew\n"
+    export = ("export", study, "--as", "bids", "-o", study / "out")
+    for call in (("verify", study), export, ("report", study, "--check")):
+        assert said in masrel(*call).err
+    done = masrel("report", study, "--against", folder)
+    assert (done.code, said in done.err) == (2, True)
+    done = masrel("report", study, "--only", "grades")
+    assert (done.code, said in done.err) == (0, True)
+    assert "figures/agreement.svg" not in contents(folder)  # what it knew is its own
+    assert said not in masrel("report", study).err
+    assert contents(folder) == before
 
 
 SPOILT: tuple[Callable[[bytes], bytes], ...] = (
@@ -284,17 +331,16 @@ def test_check_names_what_would_change_and_writes_nothing(
     assert done.code == 1
     lines = (line.rpartition(": ") for line in done.out.splitlines())
     ends = {end: file for file, _, end in lines}
-    assert set(ends) == {"would change", "would be new", "would go"}
+    assert set(ends) == {"would change"}
     assert ends["would change"] == f"{study}/report/manifest.json"
-    assert Path(ends["would go"]).is_file()
 
 
 def test_only_makes_a_report_of_what_is_named(masrel: Caller, study: Path) -> None:
     masrel("report", study)
     assert masrel("report", study, "--only", "grades").code == 0
-    names = {name.partition("-")[0] for name in contents(study / "report")}
-    assert "tables/grades_test" in names
-    assert "figures/agreement" not in names
+    names = contents(study / "report")
+    assert "tables/grades_test.csv" in names
+    assert "figures/agreement.svg" not in names
     text = (study / "report/report.md").read_text(encoding="utf-8")
     assert "## Grades" in text
     assert "## Agreement between raters" not in text

@@ -6,6 +6,7 @@ the folder is what a kill there would leave. With strace, the process is really 
 
 import errno
 import hashlib
+import json
 import os
 import re
 import signal
@@ -20,6 +21,7 @@ from typing import Any
 
 import pytest
 
+from masrel.lab._study_files import is_cut_off
 from masrel.lab.run import read_log
 
 NOTES = ".masrel_cache"  # of a report, beside it
@@ -118,18 +120,28 @@ def check_old_or_new(before: Contents, left: list[Contents], after: Contents) ->
             if path.endswith(".jsonl") and now is not None and new is not None:
                 assert new.startswith(now), path  # events are added one by one
                 assert now.startswith(old or ""), path
+            elif path.endswith("unfinished.json"):
+                assert old is None, path
+                assert new is None, path
+            elif path.endswith("report/manifest.json"):
+                assert now in (old, new, None), path  # it comes last
             else:
                 assert now in (old, new), path
 
 
 def check_links(root: Path) -> None:
-    """Every page of a report is whole, and its links lead to what it was built with."""
+    """A page of a report is whole, and with a manifest so is all that it links to."""
     for page in root.rglob("report.md"):
         text = page.read_text(encoding="utf-8")
         assert "Made by masrel" in text
-        for link in re.findall(r"\]\((\S+-([0-9a-f]{16})\.png)\)", text):
-            picture = (page.parent / link[0]).read_bytes()
-            assert hashlib.sha256(picture).hexdigest().startswith(link[1])
+        manifest = page.with_name("manifest.json")
+        if manifest.exists():
+            named = json.loads(manifest.read_bytes())["files"]
+            assert {*re.findall(r"\]\((\S+\.png)\)", text)} <= {*named}
+            there = contents(page.parent)
+            assert {name: there.get(name) for name in named} == named
+        else:
+            assert is_cut_off(page.parent)
 
 
 @contextmanager

@@ -103,11 +103,6 @@ def _report(protocol: Protocol, ratings: Ratings, folder: Path) -> ReportFiles:
     return write_report(protocol, ratings, analysis, folder, in_person=own)
 
 
-def name_of(path: Path) -> str:
-    """The name of a table or a figure, without the hash in its file's."""
-    return re.sub(r"-[0-9a-f]{16}$", "", path.stem)
-
-
 def written(
     folder: Path, protocol: Protocol, rows: Ratings, excluded: Any = (), **of: Any
 ) -> ReportFiles:
@@ -120,7 +115,7 @@ def page(files: ReportFiles) -> str:
 
 
 def rows_of(files: ReportFiles, name: str) -> list[dict[str, str]]:
-    (path,) = [path for path in files.tables if name_of(path) == name]
+    (path,) = [path for path in files.tables if path.stem == name]
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
