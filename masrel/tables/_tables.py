@@ -30,14 +30,15 @@ UNDEFINED = "undefined"
 # What tables and figures of simulated data carry
 SIMULATED = "SIMULATED DATA"
 SIMULATED_DEVICE = "SIMULATED DEVICE"
+INTERIM = "INTERIM"
 
 
 def tag_of(data: str) -> str:
-    """Return what is said before anything made of simulated data, else nothing."""
-    if "simulated" not in data:
-        return ""
-    label = SIMULATED_DEVICE if "simulated device" in data else SIMULATED
-    return f"{label.capitalize()}."
+    """Return what is said before anything made of simulated or interim data."""
+    device = [SIMULATED_DEVICE] * ("simulated device" in data)
+    labels = device or [SIMULATED] * ("simulated" in data)
+    labels += [INTERIM] * (INTERIM.lower() in data)
+    return f"{', '.join(labels).capitalize()}." if labels else ""
 
 
 Value = str | int | float | None
@@ -78,17 +79,18 @@ class Table:
     notes: tuple[str, ...] = ()  # what the reader must know, below the table
     read: tuple[str, ...] = ()  # what was read for it, above the table
     # where the data come from: "simulated", "simulated device" where persons gave the
-    # grades, "published", "reconstructed", "recorded" or "foreign"
+    # grades, "published", "reconstructed", "recorded" or "foreign"; after a plus
+    # "interim", while sessions are awaited
     data: str
 
     @property
     def tag(self) -> str:
-        """What is said before the caption of data that are simulated."""
+        """What is said before the caption of data that are simulated or interim."""
         return tag_of(self.data)
 
     @property
     def labelled_caption(self) -> str:
-        """The caption, after the label of simulated data where any are."""
+        """The caption, after the label of simulated or interim data."""
         return f"{tag_of(self.data).upper()} {self.caption}".strip()
 
 

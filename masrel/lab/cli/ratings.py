@@ -46,7 +46,7 @@ def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
         write_file(paths.raters_file, raters, within=paths.root)
     n_rows, n_missing = len(ratings.rows), ratings.n_missing
     label = " (simulated)" if ratings.simulated else ""
-    if ratings.n_from_persons == n_rows and label:
+    if label and not ratings.n_by_programs:
         label = " (simulated device)"
     click.echo(
         f"{n_rows - n_missing} ratings{label}, {n_missing} missing: {destination}"

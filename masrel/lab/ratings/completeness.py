@@ -119,7 +119,8 @@ def study_remarks(
     file : Path, optional
         A table that is used whatever the session logs say.
     has_conduct : bool, optional
-        Whether to say what happened beside the sessions, too.
+        Whether to say what happened beside the sessions, and what has changed in the
+        plan, too.
     include : collection of str, optional
         What is said though it is private: ``"who"`` recorded each, and ``"notes"``, the
         reasons.
@@ -145,8 +146,10 @@ def study_remarks(
     >>> study_remarks(study, read_protocol(study.protocol))
     ()
     """
-    remarks = [*_of_conduct(study, include)] if has_conduct else []
-    remarks += [f"{change}." for change in plan_changes(study, protocol)]
+    remarks: list[str] = []
+    if has_conduct:
+        changes = plan_changes(study, protocol)
+        remarks += [*_of_conduct(study, include), *(f"{each}." for each in changes)]
     remarks += _of_sessions(study, protocol, include)
     if file not in (None, study.published_file) and any(study.sessions.glob("*.jsonl")):
         remarks.append(

@@ -144,21 +144,21 @@ class Ratings:
     simulated: bool
 
     @property
-    def n_from_persons(self) -> int:
-        """How many ratings are of sessions in which a person gave the grades."""
-        return sum(row.grades_from in FROM_PERSONS for row in self.rows)
+    def n_by_programs(self) -> int:
+        """How many ratings a program gave, for all that is known."""
+        return sum(
+            row.source == "simulated" and row.grades_from not in FROM_PERSONS
+            for row in self.rows
+        )
 
     @property
     def simulated_counts(self) -> str:
         """Of how many ratings grade or device is simulated, in words; "" of none."""
-        n, n_programs = len(self.rows), len(self.rows) - self.n_from_persons
-        n_device = sum(
-            row.grades_from in FROM_PERSONS and "simulated" in (row.device or "")
-            for row in self.rows
-        )
-        if not self.simulated:
+        n, n_programs = len(self.rows), self.n_by_programs
+        n_device = sum(row.source == "simulated" for row in self.rows) - n_programs
+        if not n_programs + n_device:
             return ""
-        if not self.n_from_persons:
+        if n_programs == n:
             return "SIMULATED DATA: no person gave these grades."
         if not n_programs:
             return (

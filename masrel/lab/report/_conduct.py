@@ -2,13 +2,13 @@
 
 import statistics
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from masrel._input import check_option, listed
 from masrel.lab._event_log import Event
-from masrel.lab.conduct import read_conduct
+from masrel.lab.conduct import PlanChange, plan_changes, read_conduct
 from masrel.lab.conduct._study_log import conduct_hash
 from masrel.lab.progress import (
     RaterProgress,
@@ -20,9 +20,11 @@ from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import field_heading
 from masrel.lab.ratings import Correction, corrections_of, study_remarks
 from masrel.lab.report._material import FIGURES, Material
+from masrel.lab.schedule import Schedule
+from masrel.lab.schedule.presentation import _read_drawn
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
-from masrel.tables._tables import Column, Table, Value, table_of
+from masrel.tables._tables import INTERIM, Column, Table, Value, counted, table_of
 
 _WHO, _NOTES = "who", "notes"
 """What `include` may name beside fields of raters."""
@@ -46,6 +48,14 @@ class StudyConduct:
         Grades that were corrected.
     remarks : tuple of str
         What a reader must know of the sessions.
+    changes : tuple of PlanChange
+        What has changed in the plan since the first draw of schedules.
+    schedules : tuple of Schedule
+        The schedules of sessions that have begun.
+    has_published_secret : bool
+        Whether the secret that schedules were drawn from is published.
+    is_of_ratings : bool
+        Whether the ratings of the report are those of the session logs.
     sha256 : str or None
         Of what happened beside the sessions; None for nothing.
     include : frozenset of str
@@ -57,8 +67,27 @@ class StudyConduct:
     events: tuple[Event, ...]
     corrections: tuple[Correction, ...]
     remarks: tuple[str, ...]
+    changes: tuple[PlanChange, ...]
+    schedules: tuple[Schedule, ...]
+    has_published_secret: bool
+    is_of_ratings: bool
     sha256: str | None
     include: frozenset[str]
+
+    @property
+    def begun(self) -> tuple[SessionProgress, ...]:
+        """The sessions that have begun."""
+        return tuple(s for s in self.sessions if s.last_event is not None)
+
+    @property
+    def interim(self) -> str:
+        """How many sessions are complete, while others are awaited; else nothing."""
+        gone = [r.rater for r in self.raters if r.status in ("withdrawn", "excluded")]
+        complete = [s.stage == "complete" for s in self.sessions]
+        pairs = zip(self.sessions, complete, strict=True)
+        is_interim = any(not is_ and s.rater not in gone for s, is_ in pairs)
+        text = f"{INTERIM}: {sum(complete)} of {counted(len(complete), 'session')}"
+        return text * bool(self.begun and is_interim)
 
     @property
     def inputs(self) -> dict[str, str]:
@@ -106,6 +135,8 @@ def study_conduct(
     if not (study.sessions.is_dir() or study.conduct_logs()):
         return None
     sessions = session_progress(study, protocol)
+    begun = [(s.rater, s.session) for s in sessions if s.last_event is not None]
+    drawn = _read_drawn(study, begun, skips_damaged=True)
     return StudyConduct(
         sessions=sessions,
         raters=rater_progress(study, protocol, sessions),
@@ -115,6 +146,10 @@ def study_conduct(
         remarks=study_remarks(
             study, protocol, file=file, has_conduct=False, include=include
         ),
+        changes=plan_changes(study, protocol),
+        schedules=tuple(schedule for _, schedule in drawn),
+        has_published_secret=study.published_secret_file.is_file(),
+        is_of_ratings=bool(begun) and file is None,
         sha256=conduct_hash(study),
         include=frozenset(include),
     )
@@ -123,7 +158,7 @@ def study_conduct(
 def flow_section(material: Material) -> Iterator[Content]:
     """Say what became of the raters, once one has begun."""
     conduct = material.conduct
-    if conduct and any(session.last_event is not None for session in conduct.sessions):
+    if conduct and conduct.begun:
         yield _flow_table(material, conduct)
         yield _flow_figure(material, conduct)
         yield from _characteristics(material, conduct)
@@ -138,6 +173,8 @@ def conduct_section(material: Material) -> Iterator[Content]:
         yield _events_table(material, conduct)
     if conduct.corrections:
         yield _corrections_table(material, conduct)
+    if conduct.changes:
+        yield _changes_table(material, conduct)
     for text in conduct.remarks:
         yield Paragraph(text=text)
     if left_out := "; ".join(_left_out(material, conduct)):
@@ -240,14 +277,15 @@ def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Tabl
                 (field_heading(name, field), text, n) for text, n in tally.items()
             ]
     if numbers:
-        measures = ("Mean", "SD", "Median", "Least", "Most")
+        measures = {"mean": "Mean", "sd": "SD", "median": "Median"}
+        measures |= {"least": "Min", "most": "Max"}
         yield Table(
             name="rater_numbers",
             caption="What is known of the raters who are analysed: numbers",
             columns=(
                 Column(key="field", heading="Field", align="left"),
                 Column(key="n", heading="Raters"),
-                *(Column(key=m.lower(), heading=m, digits=2) for m in measures),
+                *(Column(key=k, heading=m, digits=2) for k, m in measures.items()),
             ),
             rows=tuple(numbers),
             notes=("SD: n − 1.",),
@@ -277,12 +315,12 @@ def _summary(known: Sequence[object]) -> tuple[Value, ...]:
 
 
 def _events_table(material: Material, conduct: StudyConduct) -> Table:
-    by = [Column(key="who", heading="By", align="left")] * (_WHO in conduct.include)
-    keys = ("date", "event", "rater", "session", "details")
+    keys = ["date", "event", "rater", "session", "details"]
+    names = {key: key.capitalize() for key in keys}
     return table_of(
         "events",
         "What happened beside the sessions, in order of time",
-        [*(Column(key=k, heading=k.capitalize(), align="left") for k in keys), *by],
+        [*_columns(names | {"who": "By"} if _WHO in conduct.include else names)],
         [
             {
                 **event.fields,
@@ -319,26 +357,17 @@ def _details(event: Event, has_texts: bool) -> Iterator[str]:
 
 
 def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
-    columns = [  # each is of `Correction`
-        Column(key="rater", heading="Rater", align="left"),
-        Column(key="session", heading="Session", align="left"),
-        Column(key="model", heading="Model", align="left"),
-        Column(key="repeat", heading="Repeat"),
-        Column(key="first_grade", heading="First", align="center"),
-        Column(key="grade", heading="Corrected", align="center"),
-    ]
-    if _NOTES in conduct.include:
-        columns.append(Column(key="why", heading="Reason", align="left"))
-    if _WHO in conduct.include:
-        columns.append(Column(key="who", heading="By", align="left"))
-    return Table(
-        name="corrections",
-        caption="Corrected grades",
-        columns=tuple(columns),
-        rows=tuple(
-            tuple(getattr(each, column.key) for column in columns)
-            for each in conduct.corrections
-        ),
+    return table_of(
+        "corrections",
+        "Corrected grades",
+        [
+            *_columns({"rater": "Rater", "session": "Session", "model": "Model"}),
+            Column(key="repeat", heading="Repeat"),
+            Column(key="first_grade", heading="First", align="center"),
+            Column(key="grade", heading="Corrected", align="center"),
+            *_private_columns(conduct),
+        ],
+        [asdict(each) for each in conduct.corrections],
         notes=(
             "Each correction in order of time, the last one of a presentation counts; "
             "First: as the rater gave it; –: no grade.",
@@ -347,12 +376,46 @@ def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
     )
 
 
+def _changes_table(material: Material, conduct: StudyConduct) -> Table:
+    names = {"key": "Of the plan", "before": "Before", "after": "After"}
+    names["recorded"] = "Recorded"
+    return table_of(
+        "plan_changes",
+        "Changes to the plan since the first draw of schedules",
+        [*_columns(names), *_private_columns(conduct)],
+        [
+            {
+                **asdict(change),
+                "before": change.before or "not planned",
+                "after": change.after or "not planned any more",
+                "recorded": (change.time_utc or "no")[:10],
+            }
+            for change in conduct.changes
+        ],
+        data=material.data,
+    )
+
+
+def _columns(names: Mapping[str, str]) -> Iterator[Column]:
+    # of text, by key and heading
+    yield from (Column(key=k, heading=name, align="left") for k, name in names.items())
+
+
+def _private_columns(conduct: StudyConduct) -> Iterator[Column]:
+    # why something was recorded and by whom, where that is to be shown
+    names = {"why": ("Reason", _NOTES), "who": ("By", _WHO)}
+    return _columns(
+        {k: of for k, (of, name) in names.items() if name in conduct.include}
+    )
+
+
 def _left_out(material: Material, conduct: StudyConduct) -> Iterator[str]:
     texts = [e for e in conduct.events if {"text", "why"} & {*e.fields}]
     named = [e for e in conduct.events if "who" in e.fields]
-    if (named or conduct.corrections) and _WHO not in conduct.include:
+    amended = any(change.who for change in conduct.changes)
+    if (named or amended or conduct.corrections) and _WHO not in conduct.include:
         yield f"who recorded events and corrections ({_WHO})"
-    if (texts or conduct.corrections) and _NOTES not in conduct.include:
+    if (texts or amended or conduct.corrections) and _NOTES not in conduct.include:
         yield f"texts of notes, deviations and adverse events, and reasons ({_NOTES})"
     for name, field in material.protocol.rater_fields.items():
         is_known = any(rater.values[name] is not None for rater in conduct.raters)

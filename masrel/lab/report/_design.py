@@ -6,7 +6,13 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from masrel.lab.analysis import PlannedEstimate
-from masrel.lab.protocol import Occasions, PresentationRules, Protocol, SampleSize
+from masrel.lab.protocol import (
+    Model,
+    Occasions,
+    PresentationRules,
+    Protocol,
+    SampleSize,
+)
 from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
 from masrel.lab.report._material import MANY_RATERS, Material, lacking, sentence
@@ -69,27 +75,13 @@ def design_section(material: Material) -> Iterator[Content]:
     """Describe the study: models with parameters, raters and sessions."""
     protocol = material.protocol
     study, settings = protocol.study, protocol.simulated_raters
-    n_models = len(protocol.models)
-    n_standard = sum(model.role == "standard" for model in protocol.models)
-    stretches = stretches_asked_for(protocol.presentation)
-    text = (
-        f"{study.title}. {counted(n_models, 'haptic model')} ({n_standard} "
-        f"standard, {n_models - n_standard} dummy), "
-        f"{counted(len(protocol.raters), 'rater')}, "
-        f"{counted(len(protocol.sessions), 'session')}; scale {protocol.scale.name}: "
-        f"{', '.join(protocol.scale.grades)}."
-        f"{' ' * bool(stretches)}{stretches}{beside_presentations(protocol.occasions)}"
-    )
-    if protocol.schedule.scheme != "random-order":
-        orders = orders_in_words(protocol.schedule)
-        text += f" In each session a rater meets the models in {orders}."
-    yield Paragraph(text=text)
+    grades = f"Scale {protocol.scale.name}: {', '.join(protocol.scale.grades)}."
+    yield Paragraph(text=f"{study.title}. {planned_text(protocol)} {grades}")
     if study.notes:
         yield Paragraph(text=study.notes)
-    if study.source and material.data != "published":  # else it is in the head
+    if study.source and material.origin != "published":  # else it is in the head
         yield Paragraph(text=f"The study follows {study.source}.")
-    n_simulated = len(material.ratings.rows) - material.ratings.n_from_persons
-    if material.ratings.simulated and n_simulated:
+    if n_simulated := material.ratings.n_by_programs:
         yield Paragraph(
             text=f"{n_simulated} of {len(material.ratings.rows)} grades are simulated: "
             "a simulated rater gives the intended "
@@ -105,19 +97,43 @@ def design_section(material: Material) -> Iterator[Content]:
     yield _sessions(material)
 
 
+def planned_text(protocol: Protocol) -> str:
+    """Say what the protocol plans, whatever came of it."""
+    raters = counted(len(protocol.raters), "rater")
+    sessions = counted(len(protocol.sessions), "session")
+    text = (
+        f"The protocol plans {models_in_words(protocol.models)}, {raters} and "
+        f"{sessions}, in which each rater is to meet the models in "
+        f"{orders_in_words(protocol.schedule)} and to know them by codes alone. "
+        f"{stretches_asked_for(protocol.presentation)}"
+    )
+    return f"{text.strip()}{beside_presentations(protocol.occasions)}"
+
+
+def models_in_words(models: Sequence[Model]) -> str:
+    """Return how many models there are, and of which role where some are dummies."""
+    n_dummies = sum(model.role == "dummy" for model in models)
+    text = counted(len(models), "haptic model")
+    if n_dummies:
+        dummies = counted(n_dummies, "dummy", "dummies")
+        text += f" ({len(models) - n_dummies} standard, {dummies})"
+    return text
+
+
 def stretches_asked_for(rules: PresentationRules) -> str:
     """Say how often a rater stretches the arm for one grade, unless it is once."""
     if rules.stretches == "free":
-        return "Before each grade a rater stretches the arm as often as wanted."
+        return "Before each grade a rater may stretch the arm as often as wanted."
     if isinstance(rules.stretches, tuple):
         speeds = {
             "slow": f"slow (V1, at most {as_entered(rules.slow_speed_deg_s)} deg/s)",
             "fast": f"fast (V3, at least {as_entered(rules.fast_speed_deg_s)} deg/s)",
         }
         cues = ", then ".join(speeds[cue] for cue in rules.stretches)
-        return f"Before each grade a rater stretches the arm as told: {cues}."
+        return f"Before each grade a rater is to stretch the arm as told: {cues}."
     if rules.stretches > 1:
-        return f"Before each grade a rater stretches the arm {rules.stretches} times."
+        times = f"{rules.stretches} times"
+        return f"Before each grade a rater is to stretch the arm {times}."
     return ""
 
 
@@ -126,11 +142,11 @@ def beside_presentations(occasions: Occasions) -> str:
     text = ""
     if occasions.practice:
         models = ", ".join(occasions.practice)
-        text += f" Each session begins with practice on {models}, which is not rated."
+        text += f" Each session is to begin with practice on {models}, not rated."
     if occasions.break_after is not None:
         presentations = counted(occasions.break_after, "presentation")
         minutes = as_entered(occasions.break_minutes)
-        text += f" A break of {minutes} min comes after every {presentations}."
+        text += f" A break of {minutes} min is to come after every {presentations}."
     return text
 
 
@@ -268,7 +284,7 @@ def _sessions(material: Material) -> Table:
         shown.append((session.id, n_raters, ", ".join(raters), *cells))
     return Table(
         name="sessions",
-        caption="Sessions, their raters, and the ratings there are",
+        caption="Sessions, their raters, and how many ratings there are",
         columns=(
             Column(key="session", heading="Session", align="left"),
             Column(key="n_raters", heading="Raters"),

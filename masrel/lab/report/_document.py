@@ -220,7 +220,7 @@ def make_report(
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
-        result=result_text(analysis),
+        result=result_text(material),
         sections=_chapters(
             [section for section in sections if section.blocks],
             partial(_block, assets, progress, raw_csv),

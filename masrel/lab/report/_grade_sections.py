@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.intervals.diagnosis import _share_interval
+from masrel.lab._study_files import once
 from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._descriptions import FEWEST_RATERS
-from masrel.lab.protocol import report_sections
 from masrel.lab.report._material import FIGURES, MANY_RATERS, Material, lacking
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
@@ -140,7 +140,7 @@ def _grid_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     )
     # as far as a protocol tells
     is_ordered = (
-        "order" in report_sections(protocol)
+        "order" in (protocol.report.sections or ())
         or any(line.weights != "identity" for line in protocol.analysis.estimates)
         or any(grade[0].isdecimal() for grade in scale.grades)
     )
@@ -270,6 +270,7 @@ def in_person_section(material: Material) -> Iterator[Content]:
     )
 
 
+@once
 def given_grades(material: Material) -> tuple[str, list[str], NDArray[np.int64]]:
     """Return a session, the intended grades of its models, and the grades given."""
     # the first session with grades; (n_intended, n_raters, n_grades) counts, none where
@@ -388,8 +389,8 @@ _QUESTIONS = (
     Column(key="mean", heading="Mean", where="csv"),
     Column(key="sd", heading="SD (n − 1)", where="csv"),
     Column(key="median", heading="Median"),
-    Column(key="least", heading="Least"),
-    Column(key="most", heading="Most"),
+    Column(key="least", heading="Min"),
+    Column(key="most", heading="Max"),
     Column(key="counts", heading="Answers", align="left"),
 )
 

@@ -14,7 +14,7 @@ from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.pages._sections import Paragraph
 from masrel.tables._estimate_words import Noun, origin, promise
-from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE, percent
+from masrel.tables._tables import INTERIM, SIMULATED_DEVICE, percent
 
 if TYPE_CHECKING:
     from masrel.lab.report._conduct import StudyConduct
@@ -27,24 +27,6 @@ MANY_RATERS = 30
 MANY_STRETCHES = 12
 MANY_MODELS = 12  # and panels are smaller
 
-SIMULATED_GRADES = (
-    "SIMULATED DATA – no person gave these grades",
-    "The grades and speeds in this report are simulated. They show that the study "
-    "runs; they say nothing about people or about the models.",
-)
-# Banner and sentence of a report, by who gave the grades
-_SIMULATED_IN_PART = (
-    "SIMULATED DATA – no person gave some of these grades",
-    "Some of the grades in this report are simulated; the table of sessions says of "
-    "which. Together they say nothing about people or about the models.",
-)
-_ON_SIMULATED_DEVICE = (
-    "SIMULATED DEVICE – persons gave these grades, {n} of them on hardware",
-    "Persons gave the grades in this report, {n} of them on hardware: on the simulated "
-    "device nobody felt a model, and the speeds are those of a simulated hand. Such "
-    "grades say nothing about the models.",
-)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
@@ -56,7 +38,8 @@ class Material:
     # grades given in person, whose notes are shown below their table
     in_person: InPerson | None
     # where the data come from, in one word; more than one joined by "+"
-    data: str
+    origin: str
+    data: str  # the same, and whether they are interim
     banner: str  # what every page says in large letters, if anything
     provenance: str  # the sentence at the head of the pages
     stamp: str  # the line every figure carries
@@ -78,28 +61,28 @@ def gather(
 ) -> Material:
     """Return ratings and their analysis with what every section says of them."""
     sources = sorted({row.source for row in ratings.rows})
-    if ratings.simulated and "simulated" not in sources:
-        sources.append("simulated")
-    data = "+".join(sources) or "foreign"
-    study, stamp, banner = protocol.study, "", ""
-    provenance = f"Study {study.id}, {data} ratings."
-    trace_stamp = "Model reconstruction at recorded mean speeds, not a measurement"
-    if ratings.simulated:
-        banner, provenance = SIMULATED_GRADES
-        stamp = trace_stamp = SIMULATED
-        if ratings.n_from_persons == len(ratings.rows):
-            data = data.replace("simulated", "simulated device")
-            n = "none" if sources == ["simulated"] else "not all"
-            banner, provenance = (text.format(n=n) for text in _ON_SIMULATED_DEVICE)
-            stamp = trace_stamp = SIMULATED_DEVICE
-        elif ratings.n_from_persons:
-            banner, provenance = _SIMULATED_IN_PART
-            provenance = f"{ratings.simulated_counts} {provenance}"
-    elif data == "published":
+    origin = "+".join(sources) or "foreign"
+    counts, study = ratings.simulated_counts, protocol.study
+    label = counts.partition(":")[0]
+    interim = "" if conduct is None else conduct.interim
+    file = ratings.source_path
+    came = f"{origin} ratings" if file is None else f"ratings from {file.name}"
+    stamp, provenance = label, f"Study {study.id}, {came}."
+    kind = "published" if origin == "published" else "recorded"
+    trace_stamp = f"Model reconstruction at {kind} mean speeds, not a measurement"
+    if label == SIMULATED_DEVICE:
+        origin = origin.replace("simulated", "simulated device")
+    if counts:
+        provenance, trace_stamp = sentence("simulated", label), stamp
+    elif origin == "published":
         provenance = f"Published grades and speeds: {study.source}".rstrip(": ")
         stamp = f"Published data: {study.source}".rstrip(": ")
-        trace_stamp = "Model reconstruction at published mean speeds, not a measurement"
         trace_stamp = f"{trace_stamp}: {study.source}".rstrip(": ")
+    if interim:
+        provenance = f"{provenance} {sentence('interim', 'provenance')}"
+        stamp, trace_stamp = (
+            ", ".join(filter(None, (text, INTERIM))) for text in (stamp, trace_stamp)
+        )
     sessions = {row.session for row in ratings.rows}
     raters = {row.rater for row in ratings.rows}
     return Material(
@@ -107,8 +90,9 @@ def gather(
         ratings=ratings,
         analysis=analysis,
         in_person=in_person,
-        data=data,
-        banner=banner,
+        data=f"{origin}+{INTERIM.lower()}" if interim else origin,
+        origin=origin,
+        banner=" ".join(filter(None, (counts, interim))),
         provenance=provenance,
         stamp=stamp,
         trace_stamp=trace_stamp,

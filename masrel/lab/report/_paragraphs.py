@@ -6,13 +6,18 @@ Every number is one of the analysis; the words are those of ``sentences.toml``.
 import math
 from collections.abc import Iterator, Sequence
 from importlib import import_module
+from typing import Any
 
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
-from masrel.lab.analysis import Analysis, PlannedEstimate
+from masrel.lab.analysis import PlannedEstimate
 from masrel.lab.protocol import EstimatePlan, report_sections, scale_of
 from masrel.lab.protocol._kinds import DEFAULT_KIND
-from masrel.lab.report._design import beside_presentations, stretches_asked_for
+from masrel.lab.report._conduct import StudyConduct
+from masrel.lab.report._design import (
+    models_in_words,
+    planned_text,
+)
 from masrel.lab.report._grade_sections import given_grades
 from masrel.lab.report._material import (
     Material,
@@ -21,6 +26,8 @@ from masrel.lab.report._material import (
     sentence,
 )
 from masrel.lab.report._order_tables import effect_rows
+from masrel.lab.report._pages import TEMPLATES
+from masrel.lab.run._state import FROM_PERSONS
 from masrel.lab.schedule._orders import orders_in_words
 from masrel.pages._references import (
     bibtex,
@@ -29,14 +36,20 @@ from masrel.pages._references import (
     interval_references,
     scale_references,
 )
-from masrel.pages._sections import Content, Listing, Paragraph
+from masrel.pages._sections import (
+    Content,
+    Listing,
+    Paragraph,
+    template_environment,
+)
 from masrel.scales import published_scale
 from masrel.tables._tables import counted, joined, number, percent
 
 
-def result_text(analysis: Analysis) -> str:
+def result_text(material: Material) -> str:
     """Return the first paragraph of a report."""
-    sentences = [*_between(analysis)]
+    analysis = material.analysis
+    sentences = [*_between(material)]
     if (intended := analysis.intended) is not None:
         rated = sum(1 for model in intended.models if model.n_ratings)
         name = "intended_one" if rated == 1 else "intended"
@@ -49,7 +62,7 @@ def result_text(analysis: Analysis) -> str:
                 percent=number(intended.mean, 1),
             )
         )
-    sentences += _within(analysis)
+    sentences += _within(material)
     if analysis.excluded:
         sentences.append(_excluded_text("result", analysis.excluded))
     return " ".join(sentences)
@@ -72,7 +85,8 @@ def _name_within(line: EstimatePlan) -> str:
 _COMMON = ("percent_agreement", "pooled_kappa", "stratified_kappa")
 
 
-def _between(analysis: Analysis) -> Iterator[str]:
+def _between(material: Material) -> Iterator[str]:
+    analysis = material.analysis
     entry = main_estimate(analysis)
     if entry is None:
         yield sentence("result", "none")
@@ -84,7 +98,7 @@ def _between(analysis: Analysis) -> Iterator[str]:
     yield sentence(
         "result",
         name,
-        **_words(entry),
+        **_words(material, entry),
         session=entry.line.sessions[0],
         grades=f"{counted(n_grades, 'grade')}, {entry.n_missing or 'none'} missing",
     )
@@ -100,15 +114,16 @@ def _between(analysis: Analysis) -> Iterator[str]:
             yield _ends(interval, name)
 
 
-def _within(analysis: Analysis) -> Iterator[str]:
-    planned = [p for p in analysis.estimates if p.line.kind == "test-retest"]
+def _within(material: Material) -> Iterator[str]:
+    estimates = material.analysis.estimates
+    planned = [p for p in estimates if p.line.kind == "test-retest"]
     known = (p for p in planned if p.estimate is not None or p.by_rater)
     entry = next(known, planned[0] if planned else None)
     if entry is None:
         return
     values = [rater.estimate.value for rater in entry.by_rater]
     defined = [value for value in values if not math.isnan(value)]
-    words = _words(entry)
+    words = _words(material, entry)
     words["first"], words["second"] = entry.line.sessions
     if entry.estimate is not None:
         name = "retest_undefined" if math.isnan(entry.estimate.value) else "retest"
@@ -121,8 +136,11 @@ def _within(analysis: Analysis) -> Iterator[str]:
     yield sentence("result", name, **words)
 
 
-def _words(entry: PlannedEstimate) -> dict[str, object]:
+def _words(material: Material, entry: PlannedEstimate) -> dict[str, object]:
     line, estimate = entry.line, entry.estimate
+    planned = [s.raters for s in material.protocol.sessions if s.id in line.sessions]
+    n_raters, n_planned = len(entry.raters), len(set.intersection(*map(set, planned)))
+    are_few = f"{n_raters} of " * (n_raters < n_planned)
     models = "all models" if line.models == "all" else f"the {line.models} models"
     if estimate is not None or entry.by_rater:
         kind = "model" if line.models == "all" else f"{line.models} model"
@@ -130,7 +148,7 @@ def _words(entry: PlannedEstimate) -> dict[str, object]:
         if len(entry.items) > len(entry.models):
             models += f", {len(entry.items)} presentations of them,"
     return {
-        "raters": counted(len(entry.raters), "rater"),
+        "raters": are_few + counted(max(n_raters, n_planned), "rater"),
         "models": models,
         "coefficient": _name_within(line),
         "reason": entry.reason if estimate is None else estimate.reason,
@@ -174,33 +192,78 @@ def _cite(keys: Sequence[str], used: list[str]) -> str:
 
 
 def _study(material: Material, used: list[str]) -> Iterator[str]:
-    protocol = material.protocol
-    models, sessions, scale = protocol.models, protocol.sessions, scale_of(protocol)
-    n_standard = sum(model.role == "standard" for model in models)
+    protocol, scale = material.protocol, scale_of(material.protocol)
+    rows = [row for row in material.ratings.rows if row.grade is not None]
+    graded = {row.model for row in rows}
     published = published_scale(scale)
     yield sentence(
         "methods",
-        "models",
-        raters=counted(len(protocol.raters), "rater"),
-        models=counted(len(models), "haptic model"),
-        standard=n_standard,
-        dummy=len(models) - n_standard,
-        sessions=counted(len(sessions), "session"),
+        "graded" if rows else "ungraded",
+        raters=counted(len({row.rater for row in rows}), "rater"),
+        given=counted(len(rows), "grade"),
+        models=models_in_words([m for m in protocol.models if m.id in graded]),
+        sessions=_sessions_in_words(material.sessions),
         scale=f"scale {scale.name}" if published is None else published.title,
         grades=", ".join(scale.grades),
         reference=_cite(scale_references(published), used),
     )
-    if all(model.kind == DEFAULT_KIND for model in models):
-        yield sentence("methods", "law", reference=_cite(["park2012"], used))
-    yield sentence("methods", "orders", orders=orders_in_words(protocol.schedule))
-    if protocol.schedule.repeats > 1:
-        yield sentence("methods", "repeats", repeats=protocol.schedule.repeats)
-    yield stretches_asked_for(protocol.presentation)
-    yield beside_presentations(protocol.occasions).strip()
-    if material.ratings.simulated:
-        yield sentence("methods", "simulated")
-    elif material.data == "published" and protocol.study.source:
-        yield sentence("methods", "published", source=protocol.study.source)
+    yield material.ratings.simulated_counts
+    law = ""
+    if all(model.kind == DEFAULT_KIND for model in protocol.models):
+        law = sentence("methods", "law", reference=_cite(["park2012"], used))
+    if material.conduct is not None and material.conduct.is_of_ratings:
+        yield law
+        yield from _as_recorded(material, material.conduct)
+        return
+    is_published = material.origin == "published" and protocol.study.source
+    file = material.ratings.source_path
+    yield sentence(
+        "methods",
+        "published" if is_published else "elsewhere",
+        source=protocol.study.source,
+        file="elsewhere" if file is None else f"the file {file.name}",
+    )
+    yield f"{planned_text(protocol)} {law}"
+
+
+def _sessions_in_words(sessions: Sequence[str]) -> str:
+    return f"session{'s' * (len(sessions) > 1)} {joined(sessions)}"
+
+
+def _as_recorded(material: Material, conduct: StudyConduct) -> Iterator[str]:
+    # what schedules and logs show, sessions of which the same is said together
+    protocol = material.protocol
+    words: dict[str, object] = {"counted": counted, "joined": joined, "number": number}
+    words |= {"from_persons": FROM_PERSONS, "some": _some}
+    template = template_environment(TEMPLATES).get_template("methods.txt")
+    say: Any = template.make_module(words)
+    clauses: dict[str, list[str]] = {}
+    for session in [each.id for each in protocol.sessions]:
+        places = [each for each in conduct.sessions if each.session == session]
+        rows = [
+            {
+                "n_stretches": r.n_stretches,
+                "is_by_person": r.grades_from in FROM_PERSONS,
+            }
+            for r in material.ratings.rows
+            if r.session == session and r.n_stretches is not None
+        ]
+        orders = orders_in_words(protocol.schedule)
+        for line in _lines(say.session(places, rows, protocol, orders)):
+            clauses.setdefault(line, []).append(session)
+    together: dict[str, list[str]] = {}
+    for line, sessions in clauses.items():
+        together.setdefault(_sessions_in_words(sessions), []).append(line)
+    yield from (f"In {of}, {'; '.join(lines)}." for of, lines in together.items())
+    yield from _lines(say.study(conduct))
+
+
+def _some(some: Sequence[object], every: Sequence[object], noun: str) -> str:
+    return f"{noun}s" if len(some) == len(every) > 1 else counted(len(some), noun)
+
+
+def _lines(text: object) -> list[str]:
+    return [line for line in map(str.strip, str(text).split("\n")) if line]
 
 
 def _statistics(material: Material, used: list[str]) -> Iterator[str]:
@@ -268,20 +331,23 @@ def _intervals(
     estimates: Sequence[tuple[EstimatePlan, Estimate]], used: list[str]
 ) -> Iterator[str]:
     # one sentence for each kind of interval, with the lines whose estimates have it
-    alike: dict[tuple[float, str, str, str], tuple[Interval, dict[str, None]]] = {}
+    alike: dict[tuple[object, ...], tuple[Interval, dict[str, None]]] = {}
     for line, estimate in estimates:
         interval = estimate.interval
         if interval is not None and not math.isnan(interval.low):
             kind = (interval.level, interval.kind, interval.method, interval.target)
-            alike.setdefault(kind, (interval, {}))[1][line.id] = None
+            key = (*kind, interval.prior)
+            alike.setdefault(key, (interval, {}))[1][line.id] = None
     for interval, lines in alike.values():
+        ends = "lower bounds" if interval.is_one_sided else "intervals"
         yield sentence(
             "methods",
             "interval",
             estimates=joined(list(lines)),
             level=percent(interval.level),
-            kind=interval.kind,
+            kind=f"{interval.kind} {ends}",
             population=sentence("population", interval.target),
             method=interval.method,
+            prior=f", with the prior {interval.prior}" * bool(interval.prior),
             reference=_cite(interval_references(interval), used),
         )

@@ -121,8 +121,8 @@ def _speeds_table(
             Column(key="n", heading="n"),
             Column(key="mean_deg_s", heading="Mean", digits=1),
             Column(key="sd_deg_s", heading="SD (n − 1)", digits=1),
-            Column(key="least_deg_s", heading="Least", digits=digits),
-            Column(key="most_deg_s", heading="Most", digits=digits),
+            Column(key="least_deg_s", heading="Min", digits=digits),
+            Column(key="most_deg_s", heading="Max", digits=digits),
         ),
         rows=tuple(rows),
         page_rows=tuple(shown),
@@ -213,7 +213,7 @@ def _traces_text(material: Material, values: Sequence[Speed], end_deg: float) ->
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
         "simulated device": "mean speeds of the simulated hands",
-    }.get(material.data, "recorded mean speeds")
+    }.get(material.origin, "recorded mean speeds")
     each = "stretch" if _has_many(values) else "rater"
     most = max(Counter(value.model for value in values).values())
     of_many = f", or a few of more than {MANY_STRETCHES}" * (most > MANY_STRETCHES)
@@ -391,9 +391,9 @@ def _peak_table(
         columns=(
             _MODEL,
             *(Column(key=f"{r}_nm", heading=r, digits=2, where=where) for r in raters),
-            Column(key="least_nm", heading="Least", digits=2),
+            Column(key="least_nm", heading="Min", digits=2),
             Column(key="median_nm", heading="Median", digits=2),
-            Column(key="most_nm", heading="Most", digits=2),
+            Column(key="most_nm", heading="Max", digits=2),
         ),
         rows=tuple(
             (
@@ -483,5 +483,5 @@ def _measured_drawing(
             f"measured torque is {number(largest, 1)} N·m."
         ),
         content=Drawn(FIGURES + "_stretch_figures:measured_figure", (panels,)),
-        stamp=SIMULATED if simulated else material.stamp,
+        stamp=SIMULATED if simulated and not material.banner else material.stamp,
     )

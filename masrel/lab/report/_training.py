@@ -10,7 +10,7 @@ from collections import Counter
 from masrel import __version__
 from masrel.lab.analysis._results import as_plain
 from masrel.lab.protocol import Protocol, protocol_hash
-from masrel.lab.report._material import FIGURES, SIMULATED_GRADES
+from masrel.lab.report._material import FIGURES
 from masrel.lab.training._lessons import (
     CURVE_SETS,
     CurvePoint,
@@ -208,7 +208,7 @@ def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -
     document = Document(
         title=f"Training of {record.rater}",
         tag=tag_of(curve.data),
-        banner=SIMULATED_GRADES[0] if record.simulated else "",
+        banner=f"{SIMULATED}: no person gave these grades" * record.simulated,
         provenance=f"Study {protocol.study.id}: {protocol.study.title}",
         result=f"Training of {record.rater}: {outcome(record)}.",
         sections=(Chapter(name="training", title="Training", blocks=blocks),),

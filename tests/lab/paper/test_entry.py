@@ -124,7 +124,7 @@ def test_a_sheet_becomes_a_complete_session_of_a_person(small: Small) -> None:
         shown[2].model: "3",
     }
     assert set(ratings.table["source"]) == {"recorded"}
-    assert (ratings.n_from_persons, ratings.simulated) == (3, False)
+    assert (ratings.n_by_programs, ratings.simulated) == (0, False)
     reasons = {"who": "JL", "why": "typed wrongly"}
     for row, grade in zip(rows[1:3], ("1", "2"), strict=True):
         of_code = {"code": row[2], "grade": grade, **reasons}

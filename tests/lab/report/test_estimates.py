@@ -83,8 +83,8 @@ TOLD: dict[str, tuple[Ratings, tuple[Any, ...], list[str]]] = {
     ),
     "again, and missing": (
         simulated_ratings(), (plan(), AGAIN),
-        ["In session test, 2 raters graded 2 standard models (3 grades, 1 missing)",
-         "In test and again in retest, 2 raters graded 2 standard models:"],
+        ["In session test, 2 of 8 raters graded 2 standard models (3 grades, 1 missing)",
+         "In test and again in retest, 2 of 3 raters graded 2 standard models:"],
     ),
     "undefined": (ALIKE, (plan(),), ["Fleiss' κ is undefined, as "]),
     "not there": (
@@ -98,7 +98,7 @@ TOLD: dict[str, tuple[Ratings, tuple[Any, ...], list[str]]] = {
     "raters alone": (FULL, (plan(), OF_RATERS), ["lay between 0.000 and 0.333."]),
     "a model that came again": (
         TWICE, (plan(),),
-        ["2 raters graded 2 standard models, 4 presentations of them, (6 grades"],
+        ["2 of 8 raters graded 2 standard models, 4 presentations of them, (6 grades"],
     ),
     "weights": (
         table_v(), (ALPHA,),
@@ -117,7 +117,7 @@ def test_a_result_is_told_with_what_it_rests_on(what: str, tmp_path: Path) -> No
 
 def test_excluded_raters_are_named(tmp_path: Path) -> None:
     text = result_of(table_v(), tmp_path, plan(), excluded=["R3"])
-    assert "7 raters" in text
+    assert "7 of 8 raters" in text
     assert text.endswith("None of this counts the grades of R3, who is excluded.")
 
 

@@ -202,7 +202,7 @@ def test_on_paper_no_text_is_under_the_banner_and_no_caption_is_alone(
     assert len(sheets) > 4
     top, foot = 18 / 25.4 * 72, (297 - 16) / 25.4 * 72  # of what is not margin
     if report == "simulated":
-        only_first_sheet_has(sheets, "SIMULATED DATA – no person gave these grades")
+        only_first_sheet_has(sheets, "SIMULATED DATA: no person gave these grades")
     captions = []
     for sheet in sheets:
         head = [word.text for word in sheet if word.top < top - 1]

@@ -123,8 +123,8 @@ EXPECTED = {"half_width": None, "expected_half_width": 0.31}
 SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     "counts, in the singular and plural": (
         study(sections=DESIGN), table_v(),
-        ["16 haptic models (4 standard, 12 dummy), 8 raters, 2 sessions; scale MAS: 0,",
-         "Before each grade a rater stretches the arm as often as wanted.\n",
+        ["The protocol plans 16 haptic models (4 standard, 12 dummies), 8 raters and 2 s",
+         "Before each grade a rater may stretch the arm as often as wanted. Scale MAS: ",
          "No ratings in these data: session retest.",
          f"Models without ratings in these data: {DUMMIES}."],
     ),
@@ -138,17 +138,17 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     ),
     "orders of a Williams design": (
         study(sections=DESIGN, schedule={"scheme": "williams"}), table_v(),
-        ["meets the models in an order of a Williams design"],
+        ["is to meet the models in an order of a Williams design"],
     ),
     "orders with rules": (
         study(sections=DESIGN, schedule=APART), table_v(),
-        ["meets the models in an order drawn from all in which no two standards come "
-         "in a row and at most 2 of one grade come in a row."],
+        ["to meet the models in an order drawn from all in which no two standards come "
+         "in a row and at most 2 of one grade come in a row and to know them by codes"],
     ),
     "stretches, practice and breaks": (
         study(sections=DESIGN, presentation=CUES, occasions=BREAKS), table_v(),
         ["as told: slow (V1, at most ", ", then fast (V3, at least ",
-         "begins with practice on HM1, which is not rated. A break of 3 min comes "
+         "is to begin with practice on HM1, not rated. A break of 3 min is to come "
          "after every 2 presentations."],
     ),
     "default laws": (
@@ -473,10 +473,10 @@ def test_methods_say_who_is_excluded_and_what_is_missing(tmp_path: Path) -> None
     [
         (
             ["simulated"],
-            "The grades and speeds in this report are simul",
+            "Simulated grades show that a study runs; they",
             "SIMULATED DATA",
         ),
-        (["recorded", "simulated"], "The grades and speeds in this", "SIMULATED DATA"),
+        (["recorded", "simulated"], "1 of 2 grades are a program", "SIMULATED DATA"),
         (["published"], "Published grades and speeds\n", "Published data"),
         (["recorded"], "Study hess2012, recorded ratings.", None),
     ],

@@ -270,7 +270,7 @@ def test_who_graded_and_on_which_device_are_two_facts_and_both_are_said(
     second = other or SimulatedGrades(protocol)
     run_session(*small, "R2", "test", grades=second, clock="simulated")
     logged = ratings_from_logs(*small)
-    assert (logged.simulated, logged.n_from_persons) == (True, 3 if not other else 6)
+    assert (logged.simulated, logged.n_by_programs) == (True, 0 if other else 3)
     write_ratings(logged, study.ratings_file)
     read = read_study_ratings(study.ratings_file, scale_of(protocol))
     for table in (logged.table, read.table):
@@ -286,8 +286,8 @@ def test_who_graded_and_on_which_device_are_two_facts_and_both_are_said(
             assert "no person" not in text
             assert "every simulated rater" not in text
             assert "SIMULATED DATA" not in text
-            assert "SIMULATED DEVICE – persons gave these grades, none of them" in text
-            assert "Simulated device." in text
+            assert "SIMULATED DEVICE: persons gave these grades, 6 of 6 on the" in text
+            assert "Simulated device, interim." in text
         else:
-            assert "no person gave some of these grades" in text
+            assert "SIMULATED DATA: 3 of 6 grades are a program" in text
             assert "console: R1; simulated: R2" in text
