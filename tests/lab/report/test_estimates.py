@@ -83,7 +83,7 @@ TOLD: dict[str, tuple[Ratings, tuple[Any, ...], list[str]]] = {
     ),
     "again, and missing": (
         simulated_ratings(), (plan(), AGAIN),
-        ["In session test, 2 of 8 raters graded 2 standard models (3 grades, 1 missing)",
+        ["In session test, 2 of 8 raters graded 2 standard models (3 grades, 1 missin",
          "In test and again in retest, 2 of 3 raters graded 2 standard models:"],
     ),
     "undefined": (ALIKE, (plan(),), ["Fleiss' κ is undefined, as "]),

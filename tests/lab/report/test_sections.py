@@ -123,8 +123,8 @@ EXPECTED = {"half_width": None, "expected_half_width": 0.31}
 SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     "counts, in the singular and plural": (
         study(sections=DESIGN), table_v(),
-        ["The protocol plans 16 haptic models (4 standard, 12 dummies), 8 raters and 2 s",
-         "Before each grade a rater may stretch the arm as often as wanted. Scale MAS: ",
+        ["The protocol plans 16 haptic models (4 standard, 12 dummies), 8 raters and 2",
+         "Before each grade a rater may stretch the arm as often as wanted. Scale ",
          "No ratings in these data: session retest.",
          f"Models without ratings in these data: {DUMMIES}."],
     ),

@@ -1,0 +1,238 @@
+"""What a report says was done follows the record: change that, and words change."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from masrel.lab.analysis import analyze
+from masrel.lab.conduct import (
+    allot_schedules,
+    record_amendment,
+    record_standing,
+    record_unblinding,
+)
+from masrel.lab.paper import enter_sheet
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import read_study_data
+from masrel.lab.report import study_conduct
+from masrel.lab.report._conduct import conduct_section
+from masrel.lab.report._document import made_section
+from masrel.lab.report._material import Material, gather
+from masrel.lab.report._paragraphs import result_text
+from masrel.lab.run import SimulatedGrades, run_session
+from masrel.pages._sections import Drawing, Paragraph
+from masrel.tables._tables import Table
+from tests.lab.paper.test_entry import filled, typed
+from tests.lab.run.conftest import PROTOCOL
+from tests.lab.run.test_session import console
+
+Study = tuple[StudyPaths, Protocol]
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
+
+PLAN = """[analysis]
+estimates = [{ id = "k", kind = "inter-rater", coefficient = "fleiss_kappa", \
+sessions = ["test"], target = "items" }]
+
+[schedule]"""
+OTHER = """[occasions]
+practice = ["HM1"]
+break_after = 2
+break_minutes = 1.0
+
+[schedule]
+scheme = "latin-square\""""
+BY = {"who": "Kim", "why": "an injury"}
+# by a program, in order
+PAIRS = {"run": (("R1", "test"), ("R2", "test"), ("R1", "retest"))}
+PAIRS |= {"drawn": (), "of another scheme": PAIRS["run"][:1]}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A change of the record, and what is and is not said then."""
+
+    says: tuple[str, ...]
+    never: tuple[str, ...] = ()
+    of: str = "run"  # what is changed
+    n_run: int = 3  # sessions whose logs are there
+    then: Callable[[Study], object] = str  # which changes nothing
+    include: tuple[str, ...] = ()
+
+
+def by_a_person(study: Study) -> None:
+    source, _ = console("\n1\n\n2\n\n3\n")
+    run_session(*study, "R1", "test", grades=source, clock="simulated")
+
+
+def on_paper(study: Study) -> None:
+    file = typed(study, filled(study, "1", "2", "3"))
+    enter_sheet(*study, file, "R1", "test", who="Kim")
+
+
+def publish(study: Study) -> None:
+    study[0].secret_file.rename(study[0].published_secret_file)
+
+
+def amend(study: Study) -> None:
+    paths = study[0]
+    for old, new in (
+        ("fleiss_kappa", "gwet_ac"),
+        ('target = "items"', 'target = "both"'),
+    ):
+        text = paths.protocol.read_text(encoding="utf-8").replace(old, new)
+        paths.protocol.write_text(text, encoding="utf-8")
+        if new == "gwet_ac":
+            record_amendment(paths, read_protocol(paths.protocol), **BY)
+
+
+def elsewhere(study: Study) -> Path:
+    file = study[0].root / "other.csv"
+    file.write_text("rater,model,grade\nR1,HM1,1\nR2,HM1,1\nR1,HM3,2\nR2,HM3,3\n")
+    return file
+
+
+PROGRAM = "a program in the place of 2 raters graded the models in a random order"
+BLIND = "knew them by codes alone"
+CASES = {
+    "all sessions by a program": Case(
+        ("SIMULATED DATA: no person gave these grades.", PROGRAM,
+         "In session test, 2 of 2 raters completed all 3 presentations",
+         "a simulated hand stretched the arm 1.0 times a presentation",
+         "In session retest, 1 of 1 rater completed all 3 presentations",
+         "drawn with a secret that is not published", "No unblinding is on record.",
+         "|Simulated data.|", "|SIMULATED DATA|"),
+        never=(BLIND, "INTERIM", "practice", "break", "the plan was changed"),
+    ),
+    "a session missing": Case(
+        ("INTERIM: 2 of 3 sessions", "|SIMULATED DATA, INTERIM|",
+         "|Simulated data, interim.|", "In session retest, none of 1 rater has begun",
+         "Sessions are still to come"),
+        never=("random order, drawn beforehand; none",), n_run=2,
+    ),
+    "one of two raters": Case(
+        ("INTERIM: 1 of 3 sessions", "In session test, 1 of 2 raters completed all"),
+        n_run=1,
+    ),
+    "another scheme": Case(
+        ("graded the models in an order of a Latin square, which balances places",),
+        never=("a random order",),
+        of="of another scheme", n_run=1,
+    ),
+    "a published secret": Case(
+        ("drawn with a secret that has been published",), never=("is not published",),
+        then=publish,
+    ),
+    "an unblinding": Case(
+        ("Codes were unblinded once.",), never=("No unblinding",),
+        then=lambda study: record_unblinding(*study, None, **BY),
+    ),
+    "a person instead of a program": Case(
+        ("SIMULATED DEVICE: persons gave these grades, 3 of 3 on the simulated device",
+         "1 rater met the models in a random order, drawn beforehand, and knew them by "
+         "codes alone", "raters stretched the arm 1.0 times", "In session test, 1 of 2 "
+         "raters completed all 3 presentations", "|SIMULATED DEVICE, INTERIM|"),
+        never=("a program", "SIMULATED DATA"), of="drawn", then=by_a_person,
+    ),
+    "on paper": Case(
+        ("wrote grades on sheets that have codes alone, in a random order, drawn "
+         "beforehand; what was presented to them is not on record", "|INTERIM|",
+         "Study three, recorded ratings."),
+        never=(BLIND, "stretched", "SIMULATED"), of="drawn", then=on_paper,
+    ),
+    "ratings from elsewhere": Case(
+        ("In session test, 2 raters graded 2 standard models (4 grades, none missing)",
+         "The data are 4 grades of 2 haptic models by 2 raters in session test",
+         "The ratings come from the file other.csv and not from session logs: how they "
+         "were collected is not on record. The protocol plans 3 haptic models (2 "
+         "standard, 1 dummy), 2 raters and 2 sessions, in which each rater is to meet"),
+        never=(BLIND, "completed", "INTERIM", "drawn", "In session retest"),
+        of="drawn", then=elsewhere,
+    ),
+    "ratings from elsewhere, of a study that is under way": Case(
+        ("The ratings come from the file other.csv", "INTERIM: 1 of 3 sessions"),
+        never=("completed", "SIMULATED"), n_run=1, then=elsewhere,
+    ),
+    "a changed plan": Case(
+        ("After the first draw of schedules the plan was changed; the table “Changes "
+         "to the plan” has 2 changes.", '.coefficient|"fleiss_kappa"|"gwet_ac"|20',
+         '.target|"items"|"both"|no\n'),
+        never=("Kim", "an injury"), then=amend,
+    ),
+    "a changed plan, and who changed it": Case(
+        ('|an injury|Kim\n', '|no|–|–\n'), then=amend, include=("who", "notes"),
+    ),
+    "a withdrawn rater": Case(
+        ("R1 withdrew; grades given until then count.",),
+        never=("INTERIM",), n_run=2,
+        then=lambda study: record_standing(*study, "R1", "withdrawn", **BY),
+    ),
+    "practice and breaks": Case(
+        ("1 session began with practice on HM1, which was not rated; 1 break was taken",
+         "In session test, 1 of 2 raters completed"),
+        of="of another scheme", n_run=1,
+    ),
+}  # fmt: skip
+
+
+def shown(material: Material) -> str:
+    """Headline, provenance, methods, and captions with their tags and stamps."""
+    texts = [material.banner, material.provenance, result_text(material)]
+    for name in ("methods", "grades"):
+        texts += _shown(made_section(name, material).blocks)
+    return "\n".join((*texts, *_shown(conduct_section(material)), ""))
+
+
+def _shown(blocks: object) -> list[str]:
+    texts = []
+    for block in blocks:  # type: ignore[attr-defined]
+        if isinstance(block, Paragraph):
+            texts.append(block.text)
+        elif isinstance(block, Drawing):
+            texts.append(f"{block.caption}|{block.stamp}|")
+        elif isinstance(block, Table):
+            rows = ("|".join(str(c or "–") for c in row) for row in block.rows)
+            texts += [f"{block.caption}|{block.tag}|", *rows]
+    return texts
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study as it was run, one that was only drawn, and one of another scheme."""
+    folder = tmp_path_factory.mktemp("studies")
+    for name, pairs in PAIRS.items():
+        paths = StudyPaths(folder / name)
+        paths.root.mkdir()
+        text = PROTOCOL.replace("[schedule]", PLAN)
+        if name == "of another scheme":
+            text = text.replace("[schedule]", OTHER)
+        paths.protocol.write_text(text, encoding="utf-8")
+        protocol = read_protocol(paths.protocol)
+        allot_schedules(paths, protocol)
+        for pair in pairs:
+            grades = SimulatedGrades(protocol)
+            run_session(paths, protocol, *pair, grades=grades, clock="simulated")
+    return folder
+
+
+@pytest.mark.parametrize("what", CASES)
+def test_words_follow_the_record(what: str, studies: Path, tmp_path: Path) -> None:
+    case = CASES[what]
+    paths = StudyPaths(shutil.copytree(studies / case.of, tmp_path / "study"))
+    for rater, session in PAIRS[case.of][case.n_run :]:
+        log = paths.log_file(rater, session)
+        log.unlink()
+        shutil.rmtree(log.with_suffix(""))
+    came = case.then((paths, read_protocol(paths.protocol)))
+    file = came if isinstance(came, Path) else None
+    protocol = read_protocol(paths.protocol)
+    data = read_study_data(paths, protocol, file=file)
+    conduct = study_conduct(paths, protocol, file=file, include=case.include)
+    analysis = analyze(protocol, data.ratings)
+    text = shown(gather(protocol, data.ratings, analysis, conduct=conduct))
+    for said in case.says:
+        assert said in text
+    for unsaid in case.never:
+        assert unsaid not in text
