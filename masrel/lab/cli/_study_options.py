@@ -77,7 +77,9 @@ def grading(
 
     persons = {"console": ConsoleGrades, "paper": PaperGrades}
     if grades in persons:
-        source: GradeSource = persons[grades](scale_of(protocol))
+        source: GradeSource = persons[grades](
+            scale_of(protocol), anchors=protocol.scale.anchors
+        )
         return {"grades": source, "clock": clock or "real"}
     return {"grades": simulated(protocol), "clock": clock or "simulated"}
 

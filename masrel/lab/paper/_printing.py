@@ -158,7 +158,8 @@ def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
     folder = Path(__file__).with_name("templates")
     environment = template_environment(folder)
     scale = published_scale(scale_of(protocol))
-    grades = protocol.scale.grades
+    grades, anchors = protocol.scale.grades, protocol.scale.anchors
+    texts = anchors or (scale.meanings if scale else {})
     return environment.get_template("sheet.html").render(
         version=masrel.__version__,
         style=(folder / "sheet.css").read_text(encoding="utf-8"),
@@ -167,11 +168,8 @@ def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
         instructions=[p for p in protocol.occasions.instructions.split("\n\n") if p],
         scale=scale,
         scale_name=protocol.scale.name,
-        meanings=[
-            (grade, scale.meanings[grade])
-            for grade in grades
-            if scale is not None and grade in scale.meanings
-        ],
+        meanings=[(grade, texts[grade]) for grade in grades if grade in texts],
+        anchors=anchors,
         grades=grades,
         how=_instruction(protocol.presentation, on_paper=True),
         practice=[shown.code for shown in practice_presentations(protocol)],

@@ -78,7 +78,7 @@ def _chosen(table: msgspec.Struct, *keys: str) -> list[str]:
 
 
 def _scale(protocol: Protocol) -> Iterator[str]:
-    # grades that a file of ratings can hold, each once
+    # grades that a file of ratings can hold, each once, and no anchor of another
     grades = protocol.scale.grades
     yield from _again(grades, "scale.grades", "grades that differ")
     for index, grade in enumerate(grades):
@@ -95,6 +95,11 @@ def _scale(protocol: Protocol) -> Iterator[str]:
                 f"got {got(grade)}",
             ),
         )
+    yield from (
+        f"scale.anchors: needed grades of the scale ({listed(grades)}), got {got(each)}"
+        for each in protocol.scale.anchors
+        if each not in grades
+    )
 
 
 def _is_padded(text: str) -> bool:

@@ -163,6 +163,7 @@ _PRESENTED = (
 # says nothing, so that no schedule drawn before turns stale. A list has what is so of
 # every entry.
 _LATER: dict[str, Any] = {
+    "scale": {"anchors": {}},
     "models": [
         {
             "file": None,
@@ -292,8 +293,8 @@ def presented_hash(protocol: Protocol) -> str:
     -------
     str
         SHA-256, 64 hexadecimal digits, of the study's id and the tables
-        ``scale``, ``elbow``, ``models``, ``schedule``, ``stretch``, ``presentation``,
-        ``occasions`` (practice and breaks alone) and ``device``.
+        ``scale`` (without anchors), ``elbow``, ``models``, ``schedule``, ``stretch``,
+        ``presentation``, ``occasions`` (practice and breaks alone) and ``device``.
 
     Notes
     -----
@@ -318,11 +319,14 @@ def presented_content(protocol: Protocol) -> bytes:
         UTF-8, keys sorted, no spaces: what :func:`presented_hash` hashes.
     """
     tables = {name: getattr(protocol, name) for name in _PRESENTED}
-    tables["occasions"] = msgspec.structs.replace(
-        protocol.occasions, instructions="", resume="always"
-    )
-    tables["device"] = msgspec.structs.replace(protocol.device, torque_sensor=False)
-    content = {"study": protocol.study.id, **tables}
+    replaced = msgspec.structs.replace
+    content = {
+        "study": protocol.study.id,
+        **tables,
+        "scale": replaced(protocol.scale, anchors={}),
+        "occasions": replaced(protocol.occasions, instructions="", resume="always"),
+        "device": replaced(protocol.device, torque_sensor=False),
+    }
     return _canonical(content, ignored=("file", "simulated"))  # numbers are felt
 
 

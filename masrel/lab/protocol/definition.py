@@ -42,10 +42,11 @@ class Study(_Table, frozen=True, kw_only=True):
 
 
 class ScaleDefinition(_Table, frozen=True, kw_only=True):
-    """``[scale]``: the grades a rater may give, least first."""
+    """``[scale]``: the grades a rater may give, least first, and what raters read."""
 
     name: _Text
     grades: Annotated[tuple[_Text, ...], Meta(min_length=2)]
+    anchors: dict[str, _Text] = {}
 
 
 class ElbowConstants(_Table, frozen=True, kw_only=True):

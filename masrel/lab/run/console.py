@@ -2,7 +2,7 @@
 
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, ClassVar, TextIO
 
@@ -19,7 +19,7 @@ from masrel.lab.run._grade_sources import (
     remarks_on,
 )
 from masrel.lab.run._state import FROM_PAPER
-from masrel.scales import PublishedScale, Scale, published_scale
+from masrel.scales import Scale, published_scale
 
 if TYPE_CHECKING:
     from masrel.lab.hess import EmergencyStop, PresentationStatus  # loads numpy
@@ -41,13 +41,16 @@ class ConsoleGrades(GradeSource):
 
     The words ``again`` and ``stop`` in place of a grade present the model again and
     stop the session; ``correct CODE GRADE WHY`` corrects a grade given before, ``NA``
-    for a missing one; a ``?`` says what the grades of a scale of the literature mean.
-    After more than one stretch, ``1+ 2`` is the grade 1+ that rests on stretch 2.
+    for a missing one; a ``?`` says what grades mean, where the study or masrel has
+    words for it. After more than one stretch, ``1+ 2`` is the grade 1+ that rests on
+    stretch 2.
 
     Parameters
     ----------
     scale : Scale
         The grades that can be given.
+    anchors : mapping of str to str, optional
+        What grades mean in the words of the study; none unless given.
     answers : TextIO, optional
         Where answers come from, a line each; standard input unless given.
     questions : TextIO, optional
@@ -61,11 +64,12 @@ class ConsoleGrades(GradeSource):
         self,
         scale: Scale,
         *,
+        anchors: Mapping[str, str] | None = None,
         answers: TextIO | None = None,
         questions: TextIO | None = None,
     ) -> None:
         self._scale = scale
-        self._published = published_scale(scale)
+        self._meanings = _meanings_in_words(scale, anchors)
         self._answers = sys.stdin if answers is None else answers
         self._questions = sys.stdout if questions is None else questions
 
@@ -146,7 +150,7 @@ class ConsoleGrades(GradeSource):
         """
         grades, n_stretches = ", ".join(self._scale.grades), request.n_stretches
         self._say_remarks(request)
-        meanings = "" if self._published is None else "; ? for their meanings"
+        meanings = "; ? for their meanings" if self._meanings else ""
         rests = ""
         if n_stretches > 1:
             rests = f", and the stretch it rests on, 1 to {n_stretches}, if any"
@@ -160,8 +164,8 @@ class ConsoleGrades(GradeSource):
                 return answer
             if answer == "again":
                 return None
-            if answer == "?" and self._published is not None:
-                self._say(_meanings_in_words(self._scale, self._published))
+            if answer == "?" and self._meanings:
+                self._say(self._meanings)
                 continue
             words, _, stretch = answer.rpartition(" ")
             is_one = stretch in map(str, range(1, n_stretches + 1))
@@ -374,15 +378,17 @@ class PaperGrades(ConsoleGrades):
                 return None if answer else OnSheet()
 
 
-def _meanings_in_words(scale: Scale, published: PublishedScale) -> str:
-    # where the words of a scale are, and in short what each grade means
-    words = f"{published.title}. Its own words: {published.source}.\n"
+def _meanings_in_words(scale: Scale, anchors: Mapping[str, str] | None) -> str:
+    # where the words of a scale are, and what each grade means
+    source, published = "", published_scale(scale)
+    if published is not None:
+        source = f"{published.title}. Its own words: {published.source}.\n"
+    texts = anchors or (published.meanings if published else {})
+    whose = "In the words of this study" if anchors else "In short, in masrel's words"
     lines = [
-        f"  {grade:3} {published.meanings[grade]}\n"
-        for grade in scale.grades
-        if grade in published.meanings
+        f"  {grade:3} {texts[grade]}\n" for grade in scale.grades if grade in texts
     ]
-    return words + ("In short, in masrel's words:\n" if lines else "") + "".join(lines)
+    return source + (f"{whose}:\n" if lines else "") + "".join(lines)
 
 
 def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:

@@ -40,10 +40,9 @@ HERE = Path(__file__).parent
 
 
 @cache
-def words_in(language: str) -> dict[str, Any]:
-    """Return the rater's words by what they are for; ``meanings`` by scale, grade."""
-    text = (HERE / "words" / f"{language}.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+def words_in(language: str) -> dict[str, str]:
+    """Return the rater's words by what they are for."""
+    return tomllib.loads((HERE / "words" / f"{language}.toml").read_text("utf-8"))
 
 
 class Pages:
@@ -58,15 +57,16 @@ class Pages:
         """Answer with the page itself."""
         file = self._manager.study.protocol
         study = (await asyncio.to_thread(read_protocol, file)).study
-        text = page(
-            f"{self.role}.html",
-            csrf=request.state.csrf,
-            title=study.title,
-            language=study.language,
-            words=words_in(study.language),
-            phases=",".join(PHASES),
+        return HTMLResponse(
+            page(
+                f"{self.role}.html",
+                csrf=request.state.csrf,
+                title=study.title,
+                language=study.language,
+                words=words_in(study.language),
+                phases=",".join(PHASES),
+            )
         )
-        return HTMLResponse(text)
 
     async def state(self, request: Request) -> Response:
         """Answer with what is shown."""
@@ -198,8 +198,14 @@ class RaterPages(Pages):
         if not isinstance(grade, str) or not isinstance(why, str):
             raise HTTPException(422, "needed a grade, and why it is corrected")
         rater, session, rehearsal = running
-        correction = {"code": code, "grade": grade, "who": rater, "why": why}
-        await self._manager.correct(rater, session, rehearsal=rehearsal, **correction)
+        await self._manager.correct(
+            *(rater, session),
+            rehearsal=rehearsal,
+            code=code,
+            grade=grade,
+            who=rater,
+            why=why,
+        )
 
     def _check_own(self, request: Request) -> None:
         # whether what runs is a session of this tablet's rater

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from masrel.errors import (
     MasrelError,
@@ -26,7 +26,7 @@ from masrel.errors import (
     SessionStoppedError,
 )
 from masrel.lab.hess._clock import may_use
-from masrel.lab.protocol import StudyPaths, read_protocol, scale_of
+from masrel.lab.protocol import ScaleDefinition, StudyPaths, read_protocol
 from masrel.lab.protocol._values import Answer, checked_answer
 from masrel.lab.run import (
     GradeRequest,
@@ -48,6 +48,8 @@ Message = dict[str, Any]
 
 MAX_LINE = 1 << 20
 """Bytes of the longest line that is read."""
+
+_Checked = TypeVar("_Checked")
 
 _OTHER_ENDS_S = 10.0  # within this a process ends whose server is gone
 _GONE = {"kind": "leave", "why": "as the server is gone", "who": "server gone"}
@@ -85,7 +87,9 @@ class PageGrades(GradeSource):
     name: ClassVar[str] = "browser"
     simulated: ClassVar[bool] = False
 
-    def __init__(self, channel: Channel, scale: Scale, *, rehearsal: bool) -> None:
+    def __init__(
+        self, channel: Channel, scale: ScaleDefinition, *, rehearsal: bool
+    ) -> None:
         self._channel = channel
         self._scale = scale
         self._rehearsal = rehearsal
@@ -140,22 +144,20 @@ class PageGrades(GradeSource):
 
     def grade(self, request: GradeRequest) -> str | StretchGrade | None:
         """Return the grade; None to feel it again."""
-        published = published_scale(self._scale)
-        meanings = {} if published is None else published.meanings
-        chosen: StretchGrade | None = self._ask(
+        # never a word of masrel's own, which would be taken for the scale's
+        scale = Scale(name=self._scale.name, grades=self._scale.grades)
+        published = published_scale(scale)
+        return self._ask(
             request,
             "grade",
             lambda message: self._checked_grade(request, message),
-            scale=self._scale.name,
-            grades=[
-                {"grade": grade, "meaning": meanings.get(grade)}
-                for grade in self._scale.grades
-            ],
-            meanings_source=None if published is None else published.source,
+            scale=scale.name,
+            grades=scale.grades,
+            anchors=self._scale.anchors,
+            source=published and f"{published.title}. {published.source}",
             n_stretches=request.n_stretches,
             remarks=remarks_on(request),
         )
-        return chosen
 
     def _checked_grade(
         self, request: GradeRequest, message: Message
@@ -176,10 +178,9 @@ class PageGrades(GradeSource):
 
         with self._news:  # one press too many: the arm is at rest
             self._came = deque(x for x in self._came if x["kind"] != "stop")
-        chosen: bool | Skip = self._ask(
+        return self._ask(
             request, "fault", checked, why=fault, may_skip=request.may_skip
         )
-        return chosen
 
     def instruct(self, request: GradeRequest, text: str) -> None:
         """Return when the rater has read the instructions."""
@@ -195,7 +196,7 @@ class PageGrades(GradeSource):
         def checked(message: Message) -> bool:
             return _truth(message, "anew", "the session begins anew")
 
-        return bool(self._ask(request, "anew", checked, days=days))
+        return self._ask(request, "anew", checked, days=days)
 
     def answer(self, request: QuestionRequest) -> Answer:
         """Return the answer to a question, or None for none."""
@@ -207,7 +208,7 @@ class PageGrades(GradeSource):
                 raise ParameterError(f"answer: needed {question.needed}")
             return checked_answer(question, answer, where="answer")
 
-        answer: Answer = self._ask(
+        return self._ask(
             request,
             "question",
             checked,
@@ -224,15 +225,14 @@ class PageGrades(GradeSource):
             number=1 + request.questionnaire.questions.index(question),
             n_questions=len(request.questionnaire.questions),
         )
-        return answer
 
     def _ask(
         self,
         request: GradeRequest | QuestionRequest,
         screen: str,
-        checked: Callable[[Message], Any],
+        checked: Callable[[Message], _Checked],
         **fields: Any,
-    ) -> Any:
+    ) -> _Checked:
         # what `checked` makes of the answer; what it refuses is asked again
         shown = {"screen": screen, **_place(request), **fields}
         # the same where the session goes on in another process
@@ -355,8 +355,7 @@ def _run(channel: Channel, order: Message) -> str:
     # what is said of a session that is complete
     study = StudyPaths(Path(order["study"]))
     protocol = read_protocol(study.protocol)
-    scale, rehearsal = scale_of(protocol), order["rehearsal"]
-    grades = PageGrades(channel, scale, rehearsal=rehearsal)
+    grades = PageGrades(channel, protocol.scale, rehearsal=order["rehearsal"])
     until = time.monotonic() + _OTHER_ENDS_S
     while True:
         try:
@@ -364,7 +363,7 @@ def _run(channel: Channel, order: Message) -> str:
                 *(study, protocol, order["rater"], order["session"]),
                 grades=grades,
                 clock=order["clock"],
-                rehearsal=rehearsal,
+                rehearsal=order["rehearsal"],
             )
             return f"session {summary.session} of {summary.rater} is complete"
         except SessionLogInUseError:

@@ -109,6 +109,7 @@ def test_all_that_a_rater_must_know_is_printed(new_study: New) -> None:
     for words in (
         "<p>Sit.</p><p>Move the arm.</p>",
         "Modified Ashworth Scale",
+        "words of masrel’s own",
         "<dt>1+</dt><dd>tone slightly up",
         "Stretch 1: slow, at most 10 deg/s (V1). Stretch 2: fast",
     ):
@@ -121,6 +122,13 @@ def test_all_that_a_rater_must_know_is_printed(new_study: New) -> None:
     assert page.count('class="box none"') == 2 + 3
     (typed,) = made.typed
     assert "P1" not in typed.read_text(encoding="utf-8")
+
+
+def test_the_words_of_a_study_stand_in_the_place_of_masrels(new_study: New) -> None:
+    anchors = 'name = "MAS"\nanchors = {"1+" = "a catch & more"}'
+    page = write_sheets(*new_study(('name = "MAS"', anchors))).html.read_text("utf-8")
+    assert "<dl><div><dt>1+</dt><dd>a catch &amp; more</dd></div></dl>" in page
+    assert "words of masrel" not in page
 
 
 def test_sheets_are_of_the_schedules_that_are_drawn(new_study: New) -> None:

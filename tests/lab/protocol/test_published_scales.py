@@ -45,6 +45,15 @@ def test_a_name_hashes_as_the_table_that_it_stands_for(
         assert protocol_hash(named) == protocol_hash(other)
 
 
+def test_anchors_are_words_that_make_no_schedule_stale(tmp_path: Path) -> None:
+    plain, with_words = (
+        with_scale(tmp_path, table=TABLE + anchors)
+        for anchors in ("", 'anchors = {"1" = "a catch"}\n')
+    )
+    assert presented_content(plain) == presented_content(with_words)
+    assert protocol_hash(plain) != protocol_hash(with_words)
+
+
 def test_the_angles_of_a_scale_are_asked_after_each_presentation(
     tmp_path: Path,
 ) -> None:
@@ -78,6 +87,11 @@ def test_the_angles_of_a_scale_are_asked_after_each_presentation(
             '[training]\nscale = "ashworth"\n',
             "training.scale: needed above the first table of the file, got it in "
             "[training]",
+        ),
+        (
+            "",
+            TABLE + 'anchors = {"1" = "a catch", "5" = "rigid"}\n',
+            'scale.anchors: needed grades of the scale (0, 1, 1+, 2, 3, 4), got "5"',
         ),
     ],
 )

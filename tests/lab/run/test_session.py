@@ -43,7 +43,7 @@ from masrel.lab.run import (
     run_session,
 )
 from masrel.lab.schedule import read_schedule
-from masrel.scales import MODIFIED_ASHWORTH
+from masrel.scales import MODIFIED_ASHWORTH, Scale
 
 Small = tuple[StudyPaths, Protocol]
 
@@ -154,6 +154,13 @@ def test_a_person_asks_what_grades_mean_feels_it_again_and_types_wrongly(
     assert events(small)[1:-1] == [*rated, "presented", *rated, *rated]
     log = read_log(small[0].log_file("R1", "test"))
     assert [e.fields["grade"] for e in log if e.kind == "grade"] == ["1+", "2", "3"]
+
+
+def test_a_study_has_its_own_words_for_grades(small: Small) -> None:
+    scale, said = Scale(name="our own", grades=("1", "2", "3")), io.StringIO()
+    streams = {"answers": io.StringIO("\n?\n1\n\n2\n\n3\n"), "questions": said}
+    run(small, ConsoleGrades(scale, anchors={"2": "a catch"}, **streams))
+    assert "): In the words of this study:\n  2   a catch\nGrade of" in said.getvalue()
 
 
 def test_faults_are_logged_with_the_data_before_them_and_stop_the_session_after_three(

@@ -49,7 +49,7 @@ export function choices(legend, options, { name, short = false, value = null }) 
       { className: "choice" },
       h("input", { type: "radio", name, value: option.value, checked: option.value === value }),
       h("b", {}, option.text),
-      option.meaning ? h("span", { lang: option.lang }, option.meaning) : null,
+      option.anchor ? h("span", {}, option.anchor) : null,
     ),
   );
   return h(
@@ -76,13 +76,6 @@ export function writing(id, label, { rows = 0, most = 500 } = {}) {
 /** What is written there, without spaces around it. */
 export function written(field) {
   return field.querySelector("input, textarea").value.trim();
-}
-
-/** What a grade means, in the page's language where masrel has it. */
-export function meaning(scale, { grade, meaning: english }) {
-  const translated = english && words.meanings?.[scale]?.[grade];
-  if (translated) return { meaning: translated };
-  return { meaning: english, lang: language === "en" ? undefined : "en" };
 }
 
 /** What to do with the arm; a line of its own for each cue. */

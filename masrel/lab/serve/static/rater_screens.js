@@ -15,7 +15,6 @@ import {
   form,
   instruction,
   isMarked,
-  meaning,
   number,
   submit,
   w,
@@ -107,13 +106,10 @@ export const screens = {
   }),
 
   grade: (state, act) => {
-    const options = state.grades.map((each) => ({
-      value: each.grade,
-      text: each.grade,
-      ...meaning(state.scale, each),
-    }));
-    const hasMeanings = options.some((option) => option.meaning);
-    const grades = choices(w("scale", state), options, { name: "grade", short: !hasMeanings });
+    const { anchors } = state; // the study's own words for grades, where it has any
+    const options = state.grades.map((grade) => ({ value: grade, text: grade, anchor: anchors[grade] }));
+    const short = !Object.keys(anchors).length;
+    const grades = choices(w("scale", state), options, { name: "grade", short });
     const stretches = state.n_stretches > 1 ? stretchChoices(state.n_stretches) : null;
     const save = () => {
       const grade = chosen(grades);
@@ -134,7 +130,7 @@ export const screens = {
           stretches,
           actions(submit(w("save")), button(w("again"), () => act.answer({ again: true }))),
         ),
-        hasMeanings ? credit(state) : null,
+        state.source ? credit(state, short) : null,
       ],
     };
   },
@@ -177,12 +173,10 @@ export const screens = {
   },
 };
 
-/** Whose wording a scale has, and that these are other words. */
-function credit(state) {
-  return paragraph(
-    [w("credit"), " ", h("span", { lang: "en" }, state.meanings_source)],
-    { className: "faint credit" },
-  );
+/** Where the wording of a scale is, and whose the words are that stand here. */
+function credit({ source }, short) {
+  const words = [w(short ? "credit" : "credit_anchors"), " ", h("span", { lang: "en" }, source)];
+  return paragraph(words, { className: "faint credit" });
 }
 
 function stretchChoices(n) {
