@@ -20,6 +20,17 @@ export function fill(words, values) {
   return words.replace(/\{(\w+)\}/g, (all, name) => (name in values ? String(values[name]) : all));
 }
 
+/** A time in UTC, as the record has it, and beside it what a clock here shows. */
+export function momentOf(utc) {
+  const moment = new Date(utc);
+  if (Number.isNaN(moment.valueOf())) return utc;
+  const [day, clock] = moment.toISOString().slice(0, 19).split("T");
+  const isSameDay = moment.getDate() === moment.getUTCDate();
+  const here = moment.toLocaleString(undefined, { dateStyle: isSameDay ? undefined : "medium", timeStyle: "short" });
+  const parts = [h("span", {}, day), " ", h("span", {}, `${clock} UTC`), " ", h("span", { className: "faint" }, `(here ${here})`)];
+  return h("time", { dateTime: utc }, ...parts);
+}
+
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 /**

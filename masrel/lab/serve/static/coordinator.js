@@ -1,6 +1,6 @@
 // The coordinator's page: the session that runs, the study, and what is recorded.
 
-import { h, listen, post } from "/static/common.js";
+import { h, listen, momentOf, post } from "/static/common.js";
 
 const at = (id) => document.getElementById(id);
 const phases = document.body.dataset.phases.split(",");
@@ -89,7 +89,7 @@ function showDesk() {
 }
 
 function leaveButton(said) {
-  const button = h("button", { type: "button" }, "Stop the session at its next question");
+  const button = h("button", { type: "button" }, "Pause the session at its next question");
   button.addEventListener("click", async () => {
     button.disabled = true;
     tell(said, await act("leave", {}));
@@ -146,7 +146,7 @@ function table(headings, rows) {
   );
 }
 
-const time = (utc) => (utc ? new Date(utc).toLocaleString() : "");
+const time = (utc) => (utc ? momentOf(utc) : "");
 
 function showStudy() {
   const { overview } = state;
@@ -272,7 +272,7 @@ function showJobs() {
   const { jobs, overview } = state;
   if (!overview) return;
   for (const [verb, button] of Object.entries(jobButtons)) {
-    const words = jobs[verb]?.status === "running" ? `Stop: ${verb}` : jobWords[verb];
+    const words = jobs[verb]?.status === "running" ? `Cancel: ${verb}` : jobWords[verb];
     if (button.textContent !== words) button.textContent = words;
   }
   reportLink.hidden = !overview.has_report;

@@ -119,6 +119,13 @@ function armMoves() {
 }
 
 stop.addEventListener("click", pressStop);
+
+// Where a keyboard does not make the page smaller but covers it, as on an iPad, what is
+// seen of the page moves, and the emergency stop with it.
+const sight = window.visualViewport;
+const follow = () => document.body.style.setProperty("--pan", `${sight.offsetTop}px`);
+for (const kind of ["resize", "scroll"]) sight?.addEventListener(kind, follow);
+
 document.addEventListener(
   "keydown",
   (event) => {

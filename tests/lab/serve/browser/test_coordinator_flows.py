@@ -1,6 +1,7 @@
 """What a coordinator does at the page, in Chromium."""
 
 import re
+from datetime import datetime, timedelta
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
@@ -9,7 +10,7 @@ from masrel.lab.protocol import read_protocol
 from masrel.lab.run import ScriptGrades, read_log, run_session
 from tests.lab.serve.browser.conftest import MakeStage, at_work
 from tests.lab.serve.browser.stages import Stage
-from tests.lab.serve.browser.test_rater_flows import broken, tab_to
+from tests.lab.serve.browser.test_rater_flows import broken, near_the_stop, tab_to
 from tests.lab.serve.browser.visitors import LOST, Coordinator, Rater
 
 pytestmark = pytest.mark.slow
@@ -56,7 +57,8 @@ def start(stage: Stage) -> Rater:
 def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twice(
     stage: Stage,
 ) -> None:
-    coordinator, second = stage.coordinator, stage.second_coordinator()
+    coordinator = stage.coordinator
+    second = stage.second_coordinator(timezone_id="Asia/Kolkata")
     second.tolerated = re.compile("status of 422")
     sees(second, "No session runs")
     rater = start(stage)
@@ -70,9 +72,14 @@ def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twic
     said = form(second.page, NOTE, text="Seen by two", who="AB")
     expect(said).to_contain_text("Recorded")
     sees(coordinator, "Seen by two", "#events")
+    time = second.page.locator("#events time").first
+    utc = datetime.fromisoformat(str(time.get_attribute("datetime")))
+    expect(time).to_contain_text(f"{utc:%Y-%m-%d %H:%M:%S} UTC")
+    local = f"{utc + timedelta(hours=5, minutes=30):%-I:%M}"
+    expect(time.locator(".faint")).to_contain_text(local)
     rater.go_until("grade")
     sees(coordinator, f"{stage.rater} grades practice")
-    press(second.page, "Stop the session")
+    press(second.page, "Pause the session")
     rater.wait_for("over")
     sees(coordinator, "No session runs")
     sees(coordinator, "begun", "#sessions")
@@ -151,7 +158,7 @@ def test_a_grade_is_corrected_a_code_unblinded_and_what_happens_recorded(
     assert (fields["kind"], fields["severity"]) == ("adverse-event", "mild")
     said = form(page, "A rater has left", **of, **SIGNED)
     expect(said).to_contain_text(f"{stage.rater} is withdrawn")
-    press(page, "Stop the session")
+    press(page, "Pause the session")
     sees(stage.coordinator, "No session runs")
     start(stage)  # which nobody who has left begins
     sees(stage.coordinator, "withdrawn")
@@ -217,11 +224,11 @@ def test_the_page_fits_on_a_screen_and_needs_no_mouse(stage: Stage) -> None:
     page = coordinator.page
     page.locator("#which").wait_for()
     assert broken(coordinator) == []  # all is open now
+    assert near_the_stop(coordinator) == []
     wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
     for width, height in ((390, 844), (1180, 820), (1920, 1080)):
         page.set_viewport_size({"width": width, "height": height})
         assert page.evaluate(wide) <= 0
-        expect(page.get_by_role("button", name="Emergency stop")).to_be_in_viewport()
     tab_to(coordinator, "#which")
     page.keyboard.type(f"{stage.rater},")
     tab_to(coordinator, "button.main")
@@ -248,7 +255,7 @@ def test_a_model_is_left_without_a_grade_after_a_fault_by_either(
     (skipped,) = (event.fields for event in stage.log() if event.kind == "skipped")
     assert (skipped["position"], skipped["why"]) == (1, "the motor is hot")
     sees(stage.coordinator, "1 skipped", "#sessions")
-    press(page, "Stop the session")
+    press(page, "Pause the session")
     sees(stage.coordinator, "No session runs")
     code = str(stage.log()[-2].fields["code"])
     which = {"rater": stage.rater, "session": "test", "code": code}

@@ -28,13 +28,67 @@ def broken(visitor: Visitor) -> list[str]:
     return rules
 
 
+# Whether anything that can be tapped comes within 8 mm of the emergency stop, and
+# whether the stop moves, wherever the page is scrolled and whatever it says
+NEAR = """() => {
+    const stop = document.getElementById("stop");
+    const box = () => stop.getBoundingClientRect();
+    const {left, right, top, bottom} = box();
+    const far = 8 * 96 / 25.4;
+    const problems = new Set();
+    const look = () => {
+        if (JSON.stringify(box()) !== was) problems.add("the stop has moved");
+        for (let x = Math.max(0, left - far); x < right + far; x += 40) {
+            for (let y = Math.max(0, top - far); y < bottom + far; y += 10) {
+                const other = document.elementFromPoint(x, y)?.closest(
+                    "a, button, input, label, select, summary, textarea");
+                if (other && other !== stop) problems.add(`near: ${other.textContent}`);
+            }
+        }
+    };
+    const was = JSON.stringify(box());
+    if (top < 0 || bottom > innerHeight || right > innerWidth) problems.add("no stop");
+    const {bottom: under} = stop.closest("header").getBoundingClientRect();
+    for (const each of document.querySelectorAll("main button, main label.choice")) {
+        if (!each.checkVisibility()) continue;
+        for (const edge of [under, bottom]) {  // as near as scrolling brings it
+            scrollBy(0, each.getBoundingClientRect().top - edge);
+            look();
+        }
+    }
+    for (const each of document.querySelectorAll("#banner, #lost")) {
+        const {textContent} = each;
+        each.textContent = "A message that takes more than a line. ".repeat(3);
+        look();
+        each.textContent = textContent;
+    }
+    scrollTo(0, 0);
+    return [[...problems], bottom, under];
+}"""
+
+SIZES = ((1280, 800), (768, 1024), (400, 800), (844, 390))
+
+
+def near_the_stop(visitor: Visitor) -> list[str]:
+    """Return what a finger on its way elsewhere could take the emergency stop for."""
+    problems: list[str] = []
+    for width, height in SIZES:
+        low = height  # where what could be tapped began, before a keyboard closed
+        for high in (360, height):
+            visitor.page.set_viewport_size({"width": width, "height": high})
+            found, bottom, under = visitor.page.evaluate(NEAR)
+            problems += [f"{width} x {high}: {problem}" for problem in found]
+            problems += ["the stop grows into what could be tapped"] * (bottom > low)
+            low = under
+    return problems
+
+
 # Wider than the screen, too small for a finger, or hidden below the emergency stop
 UNFIT = """() => {
     const problems = [];
     const root = document.documentElement;
     if (root.scrollWidth > root.clientWidth) problems.push("wider than the screen");
     const stop = document.getElementById("stop").getBoundingClientRect();
-    if (stop.bottom > innerHeight || stop.top < 0) problems.push("no stop in sight");
     if (stop.height > innerHeight / 3) problems.push("the stop fills the screen");
     const targets = "button, label.choice, [type=range], [type=number], textarea";
     for (const each of document.querySelectorAll(`${targets}, summary`)) {
@@ -94,6 +148,7 @@ def test_every_screen_of_a_session_fits_is_for_all_and_can_be_loaded_again(
         kind = shown, *fields.evaluate_all("all => all.map(it => it.type)")
         if kind not in seen:
             problems = [
+                *near_the_stop(rater),
                 *unfit(rater),
                 *(broken(rater) if shown != "presenting" else []),
             ]
@@ -114,6 +169,28 @@ def test_every_screen_of_a_session_fits_is_for_all_and_can_be_loaded_again(
     # a rule that is broken is seen
     rater.page.evaluate("document.documentElement.removeAttribute('lang')")
     assert [rule.split(":")[1] for rule in broken(rater)] == [" html-has-lang"] * 2
+
+
+def test_the_stop_looks_like_no_other_button_and_stays_in_sight(
+    stage: Stage,
+) -> None:
+    rater = stage.session()
+    rater.go_until("grade")
+    page = rater.page
+    edge = "it => parseFloat(getComputedStyle(it).borderTopWidth)"
+    for colours in ("none", "active"):
+        page.emulate_media(forced_colors=colours)
+        stop, save = page.locator("#stop"), page.locator("button.main")
+        assert stop.evaluate(edge) > 2 * save.evaluate(edge)
+    # as where a keyboard covers the page, and what is seen of it moves
+    devtools = rater.context.new_cdp_session(page)
+    devtools.send("Emulation.setPageScaleFactor", {"pageScaleFactor": 2})
+    page.mouse.wheel(0, 400)
+    page.wait_for_function("() => visualViewport.offsetTop > 50")
+    page.wait_for_function(
+        "() => document.getElementById('stop').getBoundingClientRect().top"
+        " >= visualViewport.offsetTop"
+    )
 
 
 def test_of_two_tablets_one_answers_and_the_other_sees_it(stage: Stage) -> None:
