@@ -33,19 +33,15 @@ from masrel.lab.progress import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import Ratings, corrections_of, read_study_data, study_remarks
-from masrel.lab.report._design import (
-    beside_presentations,
-    size_sentence,
-    stretches_asked_for,
-)
-from masrel.lab.report._material import TARGETS, coefficient_name
+from masrel.lab.report._design import size_sentence
+from masrel.lab.report._material import TARGETS, coefficient_name, lines_of, macros
 from masrel.lab.report._pages import TEMPLATES, converted
 from masrel.lab.run._state import read_session
 from masrel.lab.schedule._orders import orders_in_words
 from masrel.lab.schedule.presentation import _read_drawn
 from masrel.pages._sections import template_environment
 from masrel.tables._estimate_words import sentence
-from masrel.tables._tables import counted, number, percent
+from masrel.tables._tables import number
 
 __all__ = ["checklist_markdown", "fill_checklist", "write_checklist"]
 
@@ -149,13 +145,9 @@ def _words_of(facts: _StudyFacts, protocol: Protocol) -> dict[str, object]:
         "targets": TARGETS,
         "tally": _tally,
         "range_of": _range_of,
-        "counted": counted,
-        "percent": percent,
         "sentence": sentence,
         "size_sentence": size_sentence,
         "coefficient_name": coefficient_name,
-        "stretches_asked_for": stretches_asked_for,
-        "beside_presentations": beside_presentations,
     }
 
 
@@ -305,11 +297,9 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
         )
     title, reference, asked_for = _GUIDELINES[guideline]
     facts = _gather_facts(study, protocol)
-    environment = template_environment(TEMPLATES).overlay(finalize=_in_one_line)
-    say = environment.get_template("facts.txt")
-    macros = say.make_module(_words_of(facts, protocol))
+    say = macros("facts.txt", _words_of(facts, protocol))
     items = tuple(
-        _filled(facts, str(number), item, lambda name: str(getattr(macros, name)()))
+        _filled(facts, str(number), item, lambda name: lines_of(getattr(say, name)()))
         for number, item in enumerate(asked_for, start=1)
     )
     named = sorted({file for item in items for file in item.files})
@@ -331,7 +321,7 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
 
 
 def _filled(
-    facts: _StudyFacts, number: str, item: _Item, say: Callable[[str], str]
+    facts: _StudyFacts, number: str, item: _Item, say: Callable[[str], list[str]]
 ) -> _Item:
     to_add, names = item.to_add, item.facts
     if "ratings" in item.sources and facts.ratings is None:
@@ -343,18 +333,12 @@ def _filled(
     item = replace(item, number=number, facts=(), to_add=to_add)
     if not names:
         return item
-    lines = (line.strip() for name in names for line in say(name).split("\n"))
     return replace(
         item,
         state="in part" if to_add else "filled",
-        facts=tuple(line for line in lines if line),
+        facts=tuple(line for name in names for line in say(name)),
         files=tuple(file for key in item.sources for file in facts.files[key]),
     )
-
-
-def _in_one_line(value: object) -> object:
-    # a line of a template is a fact, whatever a protocol's texts hold
-    return " ".join(value.splitlines()) if isinstance(value, str) else value
 
 
 def _notes(facts: _StudyFacts) -> tuple[str, ...]:

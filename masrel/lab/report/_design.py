@@ -6,17 +6,11 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from masrel.lab.analysis import PlannedEstimate
-from masrel.lab.protocol import (
-    Model,
-    Occasions,
-    PresentationRules,
-    Protocol,
-    SampleSize,
-)
+from masrel.lab.protocol import Protocol, SampleSize
 from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
 from masrel.lab.report._material import MANY_RATERS, Material, lacking, sentence
-from masrel.lab.schedule._orders import orders_in_words
+from masrel.lab.report._paragraphs import planned_text
 from masrel.pages._sections import Content, Paragraph
 from masrel.tables._tables import Column, Table, Value, as_entered, counted, number
 
@@ -95,59 +89,6 @@ def design_section(material: Material) -> Iterator[Content]:
     yield from _constants(material)
     yield from _other_kinds(material)
     yield _sessions(material)
-
-
-def planned_text(protocol: Protocol) -> str:
-    """Say what the protocol plans, whatever came of it."""
-    raters = counted(len(protocol.raters), "rater")
-    sessions = counted(len(protocol.sessions), "session")
-    text = (
-        f"The protocol plans {models_in_words(protocol.models)}, {raters} and "
-        f"{sessions}, in which each rater is to meet the models in "
-        f"{orders_in_words(protocol.schedule)} and to know them by codes alone. "
-        f"{stretches_asked_for(protocol.presentation)}"
-    )
-    return f"{text.strip()}{beside_presentations(protocol.occasions)}"
-
-
-def models_in_words(models: Sequence[Model]) -> str:
-    """Return how many models there are, and of which role where some are dummies."""
-    n_dummies = sum(model.role == "dummy" for model in models)
-    text = counted(len(models), "haptic model")
-    if n_dummies:
-        dummies = counted(n_dummies, "dummy", "dummies")
-        text += f" ({len(models) - n_dummies} standard, {dummies})"
-    return text
-
-
-def stretches_asked_for(rules: PresentationRules) -> str:
-    """Say how often a rater stretches the arm for one grade, unless it is once."""
-    if rules.stretches == "free":
-        return "Before each grade a rater may stretch the arm as often as wanted."
-    if isinstance(rules.stretches, tuple):
-        speeds = {
-            "slow": f"slow (V1, at most {as_entered(rules.slow_speed_deg_s)} deg/s)",
-            "fast": f"fast (V3, at least {as_entered(rules.fast_speed_deg_s)} deg/s)",
-        }
-        cues = ", then ".join(speeds[cue] for cue in rules.stretches)
-        return f"Before each grade a rater is to stretch the arm as told: {cues}."
-    if rules.stretches > 1:
-        times = f"{rules.stretches} times"
-        return f"Before each grade a rater is to stretch the arm {times}."
-    return ""
-
-
-def beside_presentations(occasions: Occasions) -> str:
-    """Say what a session has beside its presentations: practice and breaks."""
-    text = ""
-    if occasions.practice:
-        models = ", ".join(occasions.practice)
-        text += f" Each session is to begin with practice on {models}, not rated."
-    if occasions.break_after is not None:
-        presentations = counted(occasions.break_after, "presentation")
-        minutes = as_entered(occasions.break_minutes)
-        text += f" A break of {minutes} min is to come after every {presentations}."
-    return text
 
 
 def _models(material: Material) -> Table:

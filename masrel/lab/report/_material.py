@@ -2,19 +2,29 @@
 
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Interval
 from masrel.lab.analysis import Analysis, PlannedEstimate
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import InPerson, Ratings
-from masrel.pages._sections import Paragraph
+from masrel.lab.report._pages import TEMPLATES
+from masrel.pages._sections import Paragraph, template_environment
 from masrel.tables._estimate_words import Noun, origin, promise
-from masrel.tables._tables import INTERIM, SIMULATED_DEVICE, percent
+from masrel.tables._tables import (
+    INTERIM,
+    SIMULATED_DEVICE,
+    as_entered,
+    capital,
+    counted,
+    joined,
+    number,
+    percent,
+)
 
 if TYPE_CHECKING:
     from masrel.lab.report._conduct import StudyConduct
@@ -117,6 +127,26 @@ def lacking(reason: str | None) -> Paragraph:
 
 _FILE = Path(__file__).with_name("templates") / "sentences.toml"
 _SENTENCES: dict[str, dict[str, str]] = tomllib.loads(_FILE.read_text("utf-8"))
+
+
+def macros(name: str, words: Mapping[str, object]) -> Any:
+    """Return the macros of a template of texts, which know these words and a few."""
+    shared: tuple[Callable[..., str], ...] = (
+        *(as_entered, capital, counted, joined, number, percent),
+    )
+    environment = template_environment(TEMPLATES).overlay(finalize=_in_one_line)
+    known = {word.__name__: word for word in shared}
+    return environment.get_template(name).make_module({**known, **words})
+
+
+def lines_of(text: object) -> list[str]:
+    """Return the lines of what a macro says, without those that are blank."""
+    return list(filter(None, (" ".join(of.split()) for of in str(text).split("\n"))))
+
+
+def _in_one_line(value: object) -> object:
+    # a line of a template is a fact, whatever a protocol's texts hold
+    return " ".join(value.splitlines()) if isinstance(value, str) else value
 
 
 def sentence(group: str, name: str, **words: object) -> str:
