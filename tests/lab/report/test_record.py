@@ -18,13 +18,11 @@ from masrel.lab.paper import enter_sheet
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import read_study_data
 from masrel.lab.report import study_conduct
-from masrel.lab.report._conduct import conduct_section
 from masrel.lab.report._document import made_section
 from masrel.lab.report._material import Material, gather
 from masrel.lab.report._paragraphs import result_text
 from masrel.lab.run import SimulatedGrades, run_session
-from masrel.pages._sections import Drawing, Paragraph
-from masrel.tables._tables import Table
+from masrel.tables._tables import tag_of
 from tests.lab.paper.test_entry import filled, typed
 from tests.lab.run.conftest import PROTOCOL
 from tests.lab.run.test_session import console
@@ -44,7 +42,7 @@ break_minutes = 1.0
 
 [schedule]
 scheme = "latin-square\""""
-BY = {"who": "Kim", "why": "an injury"}
+BY = {"who": "JL", "why": "an injury"}
 # by a program, in order
 PAIRS = {"run": (("R1", "test"), ("R2", "test"), ("R1", "retest"))}
 PAIRS |= {"drawn": (), "of another scheme": PAIRS["run"][:1]}
@@ -63,17 +61,14 @@ class Case:
 
 
 def by_a_person(study: Study) -> None:
-    source, _ = console("\n1\n\n2\n\n3\n")
-    run_session(*study, "R1", "test", grades=source, clock="simulated")
+    rater = "R2" if study[0].log_file("R1", "test").exists() else "R1"
+    grades = console("\n1\n" * 5)[0]
+    run_session(*study, rater, "test", grades=grades, clock="simulated")
 
 
 def on_paper(study: Study) -> None:
     file = typed(study, filled(study, "1", "2", "3"))
-    enter_sheet(*study, file, "R1", "test", who="Kim")
-
-
-def publish(study: Study) -> None:
-    study[0].secret_file.rename(study[0].published_secret_file)
+    enter_sheet(*study, file, "R1", "test", who="JL")
 
 
 def amend(study: Study) -> None:
@@ -103,12 +98,12 @@ CASES = {
          "a simulated hand stretched the arm 1.0 times a presentation",
          "In session retest, 1 of 1 rater completed all 3 presentations",
          "drawn with a secret that is not published", "No unblinding is on record.",
-         "|Simulated data.|", "|SIMULATED DATA|"),
+         "\nSimulated data.\n", "stamp='SIMULATED DATA')"),
         never=(BLIND, "INTERIM", "practice", "break", "the plan was changed"),
     ),
     "a session missing": Case(
-        ("INTERIM: 2 of 3 sessions", "|SIMULATED DATA, INTERIM|",
-         "|Simulated data, interim.|", "In session retest, none of 1 rater has begun",
+        ("INTERIM: 2 of 3 sessions", "stamp='SIMULATED DATA, INTERIM')",
+         "\nSimulated data, interim.\n", "In session retest, none of 1 rater has begun",
          "Sessions are still to come"),
         never=("random order, drawn beforehand; none",), n_run=2,
     ),
@@ -123,7 +118,9 @@ CASES = {
     ),
     "a published secret": Case(
         ("drawn with a secret that has been published",), never=("is not published",),
-        then=publish,
+        then=lambda study: study[0].secret_file.rename(
+            study[0].published_secret_file
+        ).name,
     ),
     "an unblinding": Case(
         ("Codes were unblinded once.",), never=("No unblinding",),
@@ -133,12 +130,17 @@ CASES = {
         ("SIMULATED DEVICE: persons gave these grades, 3 of 3 on the simulated device",
          "1 rater met the models in a random order, drawn beforehand, and knew them by "
          "codes alone", "raters stretched the arm 1.0 times", "In session test, 1 of 2 "
-         "raters completed all 3 presentations", "|SIMULATED DEVICE, INTERIM|"),
+         "raters completed all 3 presentations", "stamp='SIMULATED DEVICE, INTERIM')"),
         never=("a program", "SIMULATED DATA"), of="drawn", then=by_a_person,
+    ),
+    "a person and a program": Case(
+        ("SIMULATED DATA: 3 of 6 grades are a program's, 3 by persons on the simulated "
+         "device.", "1 rater met the models", "a program in the place of 1 rater grad"),
+        of="of another scheme", n_run=1, then=by_a_person,
     ),
     "on paper": Case(
         ("wrote grades on sheets that have codes alone, in a random order, drawn "
-         "beforehand; what was presented to them is not on record", "|INTERIM|",
+         "beforehand; what was presented to them is not on record", "stamp='INTERIM')",
          "Study three, recorded ratings."),
         never=(BLIND, "stretched", "SIMULATED"), of="drawn", then=on_paper,
     ),
@@ -157,12 +159,13 @@ CASES = {
     ),
     "a changed plan": Case(
         ("After the first draw of schedules the plan was changed; the table “Changes "
-         "to the plan” has 2 changes.", '.coefficient|"fleiss_kappa"|"gwet_ac"|20',
-         '.target|"items"|"both"|no\n'),
-        never=("Kim", "an injury"), then=amend,
+         "to the plan” has 2 changes.", "'\"fleiss_kappa\"', '\"gwet_ac\"', '20",
+         ".target', '\"items\"', '\"both\"', 'no')"),
+        never=("JL", "an injury"), then=amend,
     ),
     "a changed plan, and who changed it": Case(
-        ('|an injury|Kim\n', '|no|–|–\n'), then=amend, include=("who", "notes"),
+        ("'an injury', 'JL')", "'no', None, None)"), then=amend,
+        include=("who", "notes"),
     ),
     "a withdrawn rater": Case(
         ("R1 withdrew; grades given until then count.",),
@@ -178,24 +181,10 @@ CASES = {
 
 
 def shown(material: Material) -> str:
-    """Headline, provenance, methods, and captions with their tags and stamps."""
+    """Headline, methods, and tables and captions with their tags and stamps."""
     texts = [material.banner, material.provenance, result_text(material)]
-    for name in ("methods", "grades"):
-        texts += _shown(made_section(name, material).blocks)
-    return "\n".join((*texts, *_shown(conduct_section(material)), ""))
-
-
-def _shown(blocks: object) -> list[str]:
-    texts = []
-    for block in blocks:  # type: ignore[attr-defined]
-        if isinstance(block, Paragraph):
-            texts.append(block.text)
-        elif isinstance(block, Drawing):
-            texts.append(f"{block.caption}|{block.stamp}|")
-        elif isinstance(block, Table):
-            rows = ("|".join(str(c or "–") for c in row) for row in block.rows)
-            texts += [f"{block.caption}|{block.tag}|", *rows]
-    return texts
+    made = [made_section(name, material) for name in ("methods", "grades", "conduct")]
+    return "\n".join((*texts, tag_of(material.data), *map(str, made)))
 
 
 @pytest.fixture(scope="module")
@@ -205,9 +194,10 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, pairs in PAIRS.items():
         paths = StudyPaths(folder / name)
         paths.root.mkdir()
-        text = PROTOCOL.replace("[schedule]", PLAN)
-        if name == "of another scheme":
-            text = text.replace("[schedule]", OTHER)
+        more = (
+            PLAN.replace("[schedule]", OTHER) if name == "of another scheme" else PLAN
+        )
+        text = PROTOCOL.replace("[schedule]", more)
         paths.protocol.write_text(text, encoding="utf-8")
         protocol = read_protocol(paths.protocol)
         allot_schedules(paths, protocol)
