@@ -134,7 +134,7 @@ def _page(
     )
 
 
-def _block(stamp: str, number: int, content: Content) -> Block:
+def _block(stamp: str, number: str, content: Content) -> Block:
     pictures: dict[str, bytes] = {}
     if isinstance(content, Drawing):
         from masrel.plots import draw  # a page without pictures loads nothing of it

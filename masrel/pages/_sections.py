@@ -1,6 +1,6 @@
 """A document of sections, as a page that needs nothing beside itself.
 
-In: sections of paragraphs, tables, pictures and listings. Out: HTML.
+In: sections of paragraphs, tables, pictures and references. Out: HTML.
 """
 
 import base64
@@ -23,7 +23,7 @@ class Paragraph:
     """One paragraph of plain text."""
 
     text: str
-    absent: bool = False  # whether it says that something planned is not in the data
+    absent: bool = False  # whether it says that something is not there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,14 +38,14 @@ class Drawing:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Listing:
-    """Text that is shown letter by letter, to be copied."""
+class References:
+    """What is cited, as a paper lists it, and as a file beside the page has it."""
 
-    title: str
-    text: str
+    texts: tuple[str, ...]
+    bibtex: str
 
 
-Content = Paragraph | Table | Drawing | Listing
+Content = Paragraph | Table | Drawing | References
 """What a section is made of."""
 
 
@@ -62,7 +62,7 @@ _KINDS = {
     Paragraph: "paragraph",
     Table: "table",
     Drawing: "figure",
-    Listing: "listing",
+    References: "references",
 }
 
 
@@ -70,7 +70,7 @@ _KINDS = {
 class Block:
     """A part of a section, with its number among those of its kind."""
 
-    number: int
+    number: str
     content: Content
     # of a figure: its bytes, and its file from the report's folder, by form (png, svg)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
@@ -78,7 +78,7 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """What it is: paragraph, table, figure or listing."""
+        """What it is: paragraph, table, figure or references."""
         return _KINDS[type(self.content)]
 
 
@@ -89,11 +89,6 @@ class Chapter:
     name: str  # its name in the protocol's ``report.sections``
     title: str
     blocks: tuple[Block, ...]
-
-    @property
-    def is_absent(self) -> bool:
-        """Whether it only says that something planned is not in the data."""
-        return all(getattr(block.content, "absent", False) for block in self.blocks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +103,8 @@ class Document:
     sections: tuple[Chapter, ...]
     inputs: tuple[tuple[str, str], ...]  # what it was made from, and the hash of that
     version: str  # of masrel
+    # what is folded on a page and comes after the rest on paper
+    supplement: tuple[Chapter, ...] = ()
 
 
 _LETTERS = 112  # of a line of a table on paper
@@ -145,14 +142,16 @@ def narrow(table: Table) -> list[Table]:
 
 
 def chapters(
-    sections: Sequence[Section], block_of: Callable[[int, Content], Block]
+    sections: Sequence[Section],
+    block_of: Callable[[str, Content], Block],
+    prefix: str = "",
 ) -> tuple[Chapter, ...]:
     """Return sections of blocks, made of contents numbered by their kinds."""
     numbers: Counter[type] = Counter()
 
     def numbered(content: Content) -> Block:
         numbers[type(content)] += 1
-        return block_of(numbers[type(content)], content)
+        return block_of(f"{prefix}{numbers[type(content)]}", content)
 
     return tuple(
         Chapter(

@@ -77,11 +77,12 @@ def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> N
     if felt:
         click.echo(textwrap.fill(felt, 88) + "\n", err=csv)
     for name in _computed(analysis):
-        for block in made_section(name, material).blocks:
+        _, section, reason = made_section(name, material)
+        if reason:
+            click.echo(f"{name} is not in these data: {reason}\n", err=csv)
+        for block in section.blocks:
             if isinstance(block, Table):
                 click.echo(as_csv(block, raw=raw) if csv else as_text(block) + "\n")
-            elif isinstance(block, Paragraph) and block.absent:
-                click.echo(f"{name}: {block.text}\n", err=csv)
             elif isinstance(block, Paragraph) and not csv:
                 click.echo(textwrap.fill(block.text, 88) + "\n")
 

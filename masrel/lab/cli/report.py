@@ -37,6 +37,7 @@ from masrel.lab.cli._study_options import ratings_option, read_study, warnings_a
 from masrel.lab.report._report_folder import (
     NOTES,
     NUMBERS,
+    REFERENCES,
     keep_shown,
     last_shown,
     made_from,
@@ -339,7 +340,7 @@ def _made(
         "pages": [
             name
             for name in files
-            if "/" not in name and name not in (MANIFEST, NUMBERS)
+            if "/" not in name and name not in (MANIFEST, NUMBERS, REFERENCES)
         ],
         "verdict": verdict_of(analysis, gates),
     }

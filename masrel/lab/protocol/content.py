@@ -233,7 +233,7 @@ _LATER: dict[str, Any] = {
         "torque_sensor": False,
     },
     "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
-    "analysis": {"sample_sizes": ()},
+    "analysis": {"sample_sizes": (), "estimates": [{"title": ""}]},
     "report": {"gates": (), "formats": ("html", "markdown")},
     "training": {
         "kappa_insufficient": 0.6,

@@ -338,6 +338,7 @@ class EstimatePlan(_Table, frozen=True, kw_only=True):
     """``[[analysis.estimates]]``: one line of the analysis plan."""
 
     id: _Identifier
+    title: str = ""
     kind: Literal["inter-rater", "test-retest"]
     coefficient: _Text
     weights: Literal[

@@ -1,18 +1,17 @@
 """The report: one self-contained page, the same as Markdown, tables and figures.
 
 In: a protocol, its ratings and their analysis. Out: a folder with ``report.html``,
-``report.md``, ``tables/*.csv``, ``figures/*.png`` and ``*.svg``, and the hash of each
-in ``manifest.json``. The same inputs give the same bytes; there is no time of day in
-any of them.
+``report.md``, ``references.bib``, ``tables/*.csv``, ``figures/*.png`` and ``*.svg``,
+and the hash of each in ``manifest.json``. The same inputs give the same bytes; there is
+no time of day in any of them.
 """
 
 import warnings
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 from masrel.errors import MissingLettersWarning
 from masrel.lab._study_files import MANIFEST
@@ -20,7 +19,11 @@ from masrel.lab.analysis import Analysis
 from masrel.lab.analysis._results import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
-from masrel.lab.report._agreement import categories_section, estimates_section
+from masrel.lab.report._agreement import (
+    categories_section,
+    estimates_section,
+    retest_section,
+)
 from masrel.lab.report._conduct import StudyConduct, conduct_section, flow_section
 from masrel.lab.report._design import design_section, sample_size_section
 from masrel.lab.report._grade_sections import (
@@ -30,18 +33,26 @@ from masrel.lab.report._grade_sections import (
     intended_section,
     questionnaires_section,
 )
-from masrel.lab.report._material import Material, gather, lacking
+from masrel.lab.report._material import SUPPLEMENT, Material, gather
 from masrel.lab.report._order_tables import order_section
 from masrel.lab.report._pages import CONVERTED, WRITERS, pandoc_version
 from masrel.lab.report._paragraphs import methods_section, result_text
-from masrel.lab.report._report_folder import NUMBERS, replace_report, report_files
+from masrel.lab.report._report_folder import (
+    NUMBERS,
+    REFERENCES,
+    replace_report,
+    report_files,
+)
 from masrel.lab.report._trace_section import speeds_section, traces_section
 from masrel.lab.verification import Anchor
 from masrel.pages._sections import (
     Block,
+    Chapter,
     Content,
     Document,
     Drawing,
+    Paragraph,
+    References,
     Section,
     chapters,
 )
@@ -52,39 +63,30 @@ Progress = Callable[[str], object]
 """Called with the name of each figure, and of the pages, once it is made."""
 
 
-SECTIONS: dict[str, tuple[str, Callable[[Material], Iterable[Content]]]] = {
-    "design": ("Design", design_section),
-    "flow": ("Flow of the raters", flow_section),
-    "conduct": ("Conduct", conduct_section),
-    "sample-size": ("Sample size", sample_size_section),
-    "grades": ("Grades", grades_section),
-    "agreement": (
-        "Agreement between raters",
-        partial(estimates_section, kind="inter-rater"),
-    ),
-    "test-retest": (
-        "Test-retest agreement",
-        partial(estimates_section, kind="test-retest"),
-    ),
-    "categories": ("Agreement on each grade", categories_section),
-    "intended": ("Agreement with the intended grade", intended_section),
-    "confusion": ("Grades given for each intended grade", confusion_section),
-    "in-person": ("In-person and haptic grades", in_person_section),
-    "order": ("Effects of order", order_section),
-    "speeds": ("Stretching speeds", speeds_section),
-    "traces": ("Torque traces", traces_section),
-    "questionnaires": ("Questionnaires", questionnaires_section),
-    "claims": (
-        "Published numbers",
-        lambda _: [
-            lacking("masrel audit holds ratings/claims.csv against every table")
-        ],
-    ),
-    "methods": ("Methods", methods_section),
+SECTIONS: dict[str, tuple[str, str, Callable[[Material], Iterable[Content]]]] = {
+    "agreement": ("Agreement", "Estimates in full", estimates_section),
+    "grades": ("Grades", "Tables of grades", grades_section),
+    "confusion": ("Where raters disagree", "Grades by intended one", confusion_section),
+    "test-retest": ("Reliability over time", "Test-retest agreement", retest_section),
+    "design": ("", "Design", design_section),
+    "traces": ("What was presented", "Torque traces", traces_section),
+    "methods": ("Methods", "References", methods_section),
+    "flow": ("", "Flow of the raters", flow_section),
+    "conduct": ("", "Conduct", conduct_section),
+    "sample-size": ("", "Sample size", sample_size_section),
+    "categories": ("", "Agreement on each grade", categories_section),
+    "intended": ("", "Agreement with the intended grade", intended_section),
+    "in-person": ("", "In-person and haptic grades", in_person_section),
+    "order": ("", "Effects of order", order_section),
+    "speeds": ("", "Stretching speeds", speeds_section),
+    "questionnaires": ("", "Questionnaires", questionnaires_section),
+    # masrel audit has what it showed
+    "claims": ("", "Published numbers", lambda _: ()),
 }
-"""The heading of each section and what it says, by its name in ``report.sections``.
+"""The headings of each section and what it says, by its name in ``report.sections``.
 
-Those of the conduct are nowhere named.
+The first heading is that in the main part, whose order this is, if the section has
+anything there; the second that in the supplement. Flow and conduct are nowhere named.
 """
 
 _INPUTS = {
@@ -95,10 +97,42 @@ _INPUTS = {
 }
 
 
-def made_section(name: str, material: Material) -> Section:
-    """Return a section by its name, or what says why its data are not there."""
-    title, contents = SECTIONS[name]
-    return Section(name=name, title=title, blocks=tuple(contents(material)))
+def made_section(name: str, material: Material) -> tuple[Section, Section, str]:
+    """Return what a section has in the main part and the supplement, or why nothing."""
+    heading, title, contents = SECTIONS[name]
+    every = [*contents(material)]
+    reasons = [c.text for c in every if isinstance(c, Paragraph) and c.absent]
+    if len(reasons) == len(every):
+        every = []
+    if SUPPLEMENT not in every:
+        every.insert(len(every) if heading else 0, SUPPLEMENT)
+    at = every.index(SUPPLEMENT)
+    place = f"{name}-more" if heading else name
+    return (
+        Section(name=name, title=heading, blocks=tuple(every[:at])),
+        Section(name=place, title=title, blocks=tuple(every[at + 1 :])),
+        "" if len(every) > 1 else "; ".join(reasons),
+    )
+
+
+def _parts(
+    names: Sequence[str], material: Material
+) -> tuple[list[Section], list[Section]]:
+    # the main part and the supplement, of sections that have something to show
+    made = {name: made_section(name, material) for name in names}
+    main = [made[name][0] for name in SECTIONS if name in made and made[name][0].blocks]
+    more = [second for _, second, _ in made.values() if second.blocks]
+    if not main:
+        main, more = more, []
+    lacking = [
+        f"{of.title.lower()} ({reason})" for _, of, reason in made.values() if reason
+    ]
+    if lacking:  # is said once
+        text = f"Not in these data: {'; '.join(lacking)}."
+        first, *others = main or [Section(name="result", title="Result", blocks=())]
+        blocks = (*first.blocks, Paragraph(text=text, absent=True))
+        main = [replace(first, blocks=blocks), *others]
+    return main, more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,8 +176,9 @@ def write_report(
     """Write the report a protocol asks for.
 
     It begins with what the study came to, in sentences. Of the sections only those are
-    made that `masrel.lab.protocol.report_sections` names, in that order; matplotlib is
-    loaded when a section has a figure.
+    made that `masrel.lab.protocol.report_sections` names: first what is in the main
+    part, then the supplement, in that order; matplotlib is loaded when a section has a
+    figure.
 
     Parameters
     ----------
@@ -213,24 +248,23 @@ def make_report(
     # By name from the report's folder, in the order in which they are to be written
     protocol, analysis = material.protocol, material.analysis
     names = [n for n in section_names(protocol) if not only or n in only]
-    sections = [made_section(name, material) for name in names]
     assets, inputs = dict[str, bytes](), dict(analysis.inputs)
+    block = partial(_block, assets, progress, raw_csv)
+    main, supplement = _chapters(*_parts(names, material), block)
     document = Document(
         title=protocol.report.title or protocol.study.title,
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
         result=result_text(material),
-        sections=_chapters(
-            [section for section in sections if section.blocks],
-            partial(_block, assets, progress, raw_csv),
-        ),
+        sections=main,
         # what the pages end with: the hash of everything they were made from
         inputs=(
             *((f"SHA-256 of the {_INPUTS[name]}", of) for name, of in inputs.items()),
             *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
         ),
         version=analysis.masrel_version,
+        supplement=supplement,
     )
     every = {*protocol.report.formats, *formats}
     writers = [writer for name, writer in WRITERS.items() if name in every]
@@ -254,12 +288,14 @@ def section_names(protocol: Protocol) -> list[str]:
 
 
 def _chapters(
-    sections: Sequence[Section], block: Callable[[int, Content], Block]
-) -> tuple[Any, ...]:
+    main: Sequence[Section],
+    supplement: Sequence[Section],
+    block: Callable[[str, Content], Block],
+) -> tuple[tuple[Chapter, ...], tuple[Chapter, ...]]:
     # letters that no font has are said of all figures at once
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        made = chapters(sections, block)
+        made = chapters(main, block), chapters(supplement, block, "S")
     lacking: set[str] = set()
     for message in (warning.message for warning in caught):
         if isinstance(message, MissingLettersWarning):
@@ -275,13 +311,16 @@ def _block(
     assets: dict[str, bytes],
     progress: Progress | None,
     raw_csv: bool,
-    number: int,
+    number: str,
     content: Content,
 ) -> Block:
-    # as it is shown; files of tables and figures go to the assets
+    # as it is shown; files of tables, figures and references go to the assets
     if isinstance(content, Table):
-        data = as_csv(content, raw=raw_csv).encode()
-        assets[_new_place(assets, f"tables/{content.name}", "csv")] = data
+        data, name = as_csv(content, raw=raw_csv).encode(), f"tables/{content.name}"
+        if assets.get(f"{name}.csv") != data:  # not once more: fewer columns of it
+            assets[_new_place(assets, name, "csv")] = data
+    if isinstance(content, References):
+        assets[REFERENCES] = content.bibtex.encode()
     if not isinstance(content, Drawing):
         return Block(number=number, content=content)
     drawn = draw(content.content, stamp=content.stamp)

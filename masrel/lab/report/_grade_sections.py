@@ -14,7 +14,17 @@ from masrel.intervals.diagnosis import _share_interval
 from masrel.lab._study_files import once
 from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._descriptions import FEWEST_RATERS
-from masrel.lab.report._material import FIGURES, MANY_RATERS, Material, lacking
+from masrel.lab.report._material import (
+    FIGURES,
+    INTERVAL,
+    MANY_RATERS,
+    NOTHING,
+    SUPPLEMENT,
+    Material,
+    are_too_few,
+    interval_cells,
+    lacking,
+)
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value, counted, number, percent
@@ -26,13 +36,17 @@ def grades_section(material: Material) -> Iterator[Content]:
     """Show every grade of every session, as a grid of models by raters."""
     felt = felt_sentences(material)
     if not material.sessions:
-        yield Paragraph(text="These data hold no ratings.", absent=True)
+        yield lacking("there are no ratings")
     elif felt:
         yield Paragraph(text=felt)
+    blocks: list[Content] = []
     for session in material.sessions:
         grid = _grid(material, session)
         is_many = len(grid.raters) > MANY_RATERS
-        yield from (_counted_blocks if is_many else _grid_blocks)(material, grid)
+        blocks += (_counted_blocks if is_many else _grid_blocks)(material, grid)
+    yield from (block for block in blocks if isinstance(block, Drawing))
+    yield SUPPLEMENT
+    yield from (block for block in blocks if isinstance(block, Table))
 
 
 def felt_sentences(material: Material) -> str:
@@ -317,6 +331,9 @@ def confusion_section(material: Material) -> Iterator[Content]:
     grades, level = material.ratings.scale.grades, material.analysis.level
     caption = f"Grades given for each intended grade, session {session}"
     shares = _shares(by_rater, [grades.index(aim) for aim in intended], level)
+    few = are_too_few(counted(by_rater.shape[1], "rater"))
+    drawn = shares.copy()
+    drawn[1:, shares[2] - shares[1] >= NOTHING] = np.nan
     counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
     framed = np.array([[grade == aim for grade in grades] for aim in intended])
     yield Paragraph(
@@ -328,7 +345,7 @@ def confusion_section(material: Material) -> Iterator[Content]:
         + ", ".join(f"{n} of {g}" for g, n in zip(grades, of_aim, strict=True) if n)
         for aim, of_aim in zip(intended, counts.tolist(), strict=True)
     ]
-    pictured = (intended, counts, framed, shares, grades, level)
+    pictured = (intended, counts, framed, drawn, grades, level)
     yield Drawing(
         name="confusion",
         caption=(
@@ -341,6 +358,7 @@ def confusion_section(material: Material) -> Iterator[Content]:
         content=Drawn(FIGURES + "_study_figures:aim_pictures", pictured),
         stamp=material.stamp,
     )
+    yield SUPPLEMENT
     yield Table(
         name="confusion",
         caption=caption,
@@ -349,19 +367,24 @@ def confusion_section(material: Material) -> Iterator[Content]:
             *(Column(key=f"grade_{grade}", heading=grade) for grade in grades),
             Column(key="n_ratings", heading="Ratings"),
             Column(key="percent", heading="As intended (%)", digits=1),
-            Column(key="low", heading="Low", digits=1),
-            Column(key="high", heading="High", digits=1),
+            *INTERVAL,
         ),
         rows=tuple(
-            (aim, *of_aim, sum(of_aim), *percents)
-            for aim, of_aim, percents in zip(
+            (
+                aim,
+                *of_aim,
+                sum(of_aim),
+                value,
+                *interval_cells(*ends, few=few, whole=100.0),
+            )
+            for aim, of_aim, (value, *ends) in zip(
                 intended, counts.tolist(), (100.0 * shares.T).tolist(), strict=True
             )
         ),
         notes=(
             "Rows: the grade a model was built for; columns: the grades given. Where "
             "the scale has an order, those left of the intended one are too low and "
-            "those right of it too high. Low, High: "
+            "those right of it too high. Interval: "
             f"{percent(level)} % confidence interval of "
             "the percentage, for other raters like these on these models.",
         ),

@@ -2,15 +2,16 @@
 
 import math
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from masrel.agreement import COEFFICIENTS
-from masrel.estimates import Interval
+from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import Analysis, PlannedEstimate
-from masrel.lab.protocol import Protocol
+from masrel.lab.protocol import EstimatePlan, Protocol
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.lab.report._pages import TEMPLATES
 from masrel.pages._sections import Paragraph, template_environment
@@ -18,9 +19,11 @@ from masrel.tables._estimate_words import Noun, origin, promise
 from masrel.tables._tables import (
     INTERIM,
     SIMULATED_DEVICE,
+    Column,
     as_entered,
     capital,
     counted,
+    interval_text,
     joined,
     number,
     percent,
@@ -121,8 +124,11 @@ def main_estimate(analysis: Analysis) -> PlannedEstimate | None:
 
 def lacking(reason: str | None) -> Paragraph:
     """Return what says why a section is not there."""
-    text = f"Not in these data: {reason or 'this was not computed'}."
-    return Paragraph(text=text, absent=True)
+    return Paragraph(text=reason or "this was not computed", absent=True)
+
+
+SUPPLEMENT = Paragraph(text="")
+"""After this, what a section shows is in the supplement."""
 
 
 _FILE = Path(__file__).with_name("templates") / "sentences.toml"
@@ -172,6 +178,67 @@ def coefficient_name(coefficient: str, weights: str = "identity") -> str:
         title = f"{title}, {weights} weights"
     # A share as all others are: 1 is all, not 100.
     return f"{title} (0–1)" if coefficient == "percent_agreement" else title
+
+
+def estimate_titles(lines: Sequence[EstimatePlan]) -> dict[str, str]:
+    """Return what each line of a plan is called, by its id."""
+    titles = {}
+    for line in lines:
+        name = coefficient_name(line.coefficient, line.weights)
+        again = " in two sessions" * (line.kind == "test-retest")
+        titles[line.id] = line.title or f"{name}, {line.models} models{again}"
+    # those that are called the same, also by their populations, or else their ids
+    parts: tuple[Callable[[EstimatePlan], str], ...] = (
+        lambda line: f", for {TARGETS[line.target]}",
+        lambda line: f" ({line.id})",
+    )
+    for part in parts:
+        alike = Counter(titles.values())
+        titles |= {
+            line.id: titles[line.id] + part(line)
+            for line in lines
+            if alike[titles[line.id]] > 1
+        }
+    return titles
+
+
+INTERVAL = (
+    Column(key="interval", heading="Interval", where="page"),
+    Column(key="low", heading="Low", where="csv"),
+    Column(key="high", heading="High", where="csv"),
+)
+"""Columns of `interval_cells`."""
+
+NOTHING = 0.9
+"""The width of an interval, of all that there is, from which on it says nothing."""
+
+
+def interval_cells(
+    low: float, high: float, *, few: str, whole: float = 1.0
+) -> tuple[str, float, float]:
+    """Return an interval as shown, or that it rests on too few, and its ends."""
+    text = interval_text(low, high, 3 if whole == 1.0 else 1)
+    return few if high - low >= NOTHING * whole else text, low, high
+
+
+def are_too_few(*counts: str) -> str:
+    """Say that something is too little for an interval."""
+    is_one = len(counts) == 1 and counts[0].startswith("1 ")
+    return f"{joined(counts)} {'is' if is_one else 'are'} too few"
+
+
+def too_few(estimate: Estimate) -> str:
+    """Return why an interval is not shown that says nothing; else nothing."""
+    interval, in_units = estimate.interval, COEFFICIENTS[estimate.coefficient].in_units
+    if interval is None or in_units or not interval.high - interval.low >= NOTHING:
+        return ""
+    names = {"items": "model", "raters": "rater"}
+    counts = {
+        name: counted(getattr(estimate, f"n_{name}"), of) for name, of in names.items()
+    }
+    return are_too_few(
+        *(of for name, of in counts.items() if interval.target in (name, "both"))
+    )
 
 
 def interval_name(interval: Interval) -> str:

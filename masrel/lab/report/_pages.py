@@ -39,11 +39,12 @@ def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
     environment.filters |= {"md": escape, "cells": page_cells, "rule": _rule}
     environment.filters |= {"narrow": narrow}  # no wider than paper
     template = environment.get_template("report.md")
-    return template.render(document=document, for_pandoc=form is not None)
+    return template.render(document=document, form=form)
 
 
 def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:
-    blocks = [block for section in document.sections for block in section.blocks]
+    every = (*document.sections, *document.supplement)
+    blocks = [block for section in every for block in section.blocks]
     pictures = {
         block.files["png"]: block.pictures["png"] for block in blocks if block.files
     }

@@ -18,6 +18,7 @@ from masrel.lab.protocol._kinds import DEFAULT_KIND
 from masrel.lab.report._conduct import StudyConduct
 from masrel.lab.report._grade_sections import given_grades
 from masrel.lab.report._material import (
+    SUPPLEMENT,
     Material,
     coefficient_name,
     lines_of,
@@ -32,9 +33,10 @@ from masrel.pages._references import (
     cited,
     coefficient_references,
     interval_references,
+    reference_texts,
     scale_references,
 )
-from masrel.pages._sections import Content, Listing, Paragraph
+from masrel.pages._sections import Content, Paragraph, References
 from masrel.scales import published_scale
 from masrel.tables._tables import number
 
@@ -141,8 +143,10 @@ def methods_section(material: Material) -> Iterator[Content]:
     yield Paragraph(text=" ".join(_study(material, say)))
     of_numbers = lines_of(say.statistics(intervals, sections, versions))
     yield Paragraph(text=" ".join(of_numbers))
+    yield SUPPLEMENT
     if used:
-        yield Listing(title="References in BibTeX", text=bibtex(used))
+        texts = tuple(reference_texts(used))
+        yield References(texts=texts, bibtex=f"{bibtex(used)}\n")
 
 
 def _estimates(planned: PlannedEstimate) -> list[Estimate]:

@@ -35,6 +35,7 @@ if sys.platform != "win32":
     import fcntl
 
 NUMBERS = "analysis.json"
+REFERENCES = "references.bib"
 
 # What a build writes and may remove: pages and what stands beside them
 _OWN = re.compile(

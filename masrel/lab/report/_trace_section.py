@@ -33,6 +33,7 @@ from masrel.lab.report._material import (
     MANY_MODELS,
     MANY_RATERS,
     MANY_STRETCHES,
+    SUPPLEMENT,
     Material,
     at_ranks,
     lacking,
@@ -203,6 +204,8 @@ def traces_section(material: Material) -> Iterator[Content]:
     for nth, first in enumerate(range(0, len(models), size), start=1):
         shown = models[first : first + size]
         yield _traces_drawing(material, shown, nth, has_angle=has_angle)
+        if nth == 1:
+            yield SUPPLEMENT
     yield _peak_table(material, models, session)
     yield from measured_blocks(material)
 

@@ -200,10 +200,10 @@ def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -
     )
     picture = draw(drawing.content, stamp=drawing.stamp, forms=("svg",))["svg"]
     blocks = (
-        Block(number=1, content=Paragraph(text=NOT_RATINGS)),
-        Block(number=1, content=drawing, pictures={"svg": picture}),
-        Block(number=1, content=curve),
-        Block(number=2, content=confusion),
+        Block(number="1", content=Paragraph(text=NOT_RATINGS)),
+        Block(number="1", content=drawing, pictures={"svg": picture}),
+        Block(number="1", content=curve),
+        Block(number="2", content=confusion),
     )
     document = Document(
         title=f"Training of {record.rater}",

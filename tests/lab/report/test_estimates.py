@@ -14,6 +14,7 @@ from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import PlannedEstimate, analyze
 from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.lab.report import ReportFiles, write_report
+from masrel.lab.report._material import estimate_titles
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.analysis.studies import of_session, plan, protocol_with, ratings, table_v
 from tests.lab.report.pages import AGAIN, simulated_ratings
@@ -151,31 +152,51 @@ def shown(
 
 
 def test_the_csv_has_every_number_and_the_page_one_interval(tmp_path: Path) -> None:
-    ((head, row), (cells,), text) = shown(tmp_path, one(interval=interval()))
-    assert head == [
-        "Estimate", "Coefficient", "Models", "Session", "Raters", "Value", "Interval",
-        "At least", "p_o", "p_e",
+    (head, row, *full), (cells,), text = shown(tmp_path, one(interval=interval()))
+    assert head == ["Estimate", "Value", "Interval", "Models", "Raters"]
+    assert row == ["Fleiss' κ, standard models", "0.626", "[0.320, 0.933]", "4", "8"]
+    assert [cells[: len(head)] for cells in full] == [head, row]
+    assert [full[1][at] for at in (5, 6, 8)] == [
+        "95 % confidence, jackknife, t(7)", "other raters", "fair",
     ]  # fmt: skip
-    assert row[5:8] == ["0.626", "[0.320, 0.933] ᵃ", "fair"]
-    assert "ᵃ 95 % confidence, jackknife, t(7); generalises to other raters." in text
+    assert "Intervals of 95 %: confidence for other raters." in text
     expected = {"value": "0.626083678854127", "low": "0.31957", "high": "0.93252"}
     expected |= {"interval": "95 % confidence, jackknife, t(7)", "n_items": "4"}
     expected |= {"target": "other raters", "n_raters": "8", "models": "standard"}
+    expected |= {"id": "kappa", "title": row[0], "coefficient": "Fleiss' κ"}
     assert {key: cells[key] for key in expected} == expected
     assert "interval_shown" not in cells
 
 
-def test_intervals_made_alike_share_a_mark_and_a_meaning(tmp_path: Path) -> None:
+def test_intervals_made_alike_share_a_meaning_and_wide_ones_are_not_shown(
+    tmp_path: Path,
+) -> None:
     other = interval(kind="credible", method="posterior", target="both", level=0.999)
     alike = (one(interval=interval()), one(interval=interval(low=0.1)))
-    (_, *rows), _, text = shown(tmp_path / "a", *alike, one(interval=other), one())
-    marks = ["[0.320, 0.933] ᵃ", "[0.100, 0.933] ᵃ", "[0.320, 0.933] ᵇ", "–"]
-    assert [row[6] for row in rows] == marks
-    assert text.count("about 95 % of the intervals") == 1
+    wide = (interval(low=-0.2, target=target) for target in ("items", "raters", "both"))
+    lines = (*alike, one(interval=other), one(), *(one(interval=of) for of in wide))
+    (_, *rows), cells, text = shown(tmp_path, *lines)
+    assert [row[2] for row in rows[:7]] == [
+        "[0.320, 0.933]", "[0.100, 0.933]", "[0.320, 0.933]", "–",
+        "4 models are too few", "8 raters are too few",
+        "4 models and 8 raters are too few",
+    ]  # fmt: skip
+    assert cells[4]["low"] == "-0.2"  # the file has it
+    assert "0.626 [-0.2" not in text.replace("−", "-")  # of the forest
+    assert text.count("about 95 % of the intervals") == 3
     assert text.count("with probability 99.9 %") == 1
-    lines = [one(interval=interval(method=f"way {i}")) for i in range(60)]
-    (_, *rows), _, _ = shown(tmp_path / "b", *lines)
-    assert len({row[6].split()[-1] for row in rows}) == 60
+
+
+def test_an_estimate_has_a_title_of_its_own_or_one_that_no_other_has() -> None:
+    lines = [
+        plan(id="a"), plan(id="b", target="items"), plan(id="c", target="items"),
+        plan(id="d", title="My κ"), plan(id="e", models="dummy"), AGAIN,
+    ]  # fmt: skip
+    kappa = "Fleiss' κ, standard models, for other"
+    assert list(estimate_titles(lines).values()) == [
+        f"{kappa} raters", f"{kappa} models (b)", f"{kappa} models (c)", "My κ",
+        "Fleiss' κ, dummy models", "Stratified κ, standard models in two sessions",
+    ]  # fmt: skip
 
 
 def test_what_a_reader_must_know_is_below_the_table(tmp_path: Path) -> None:
@@ -184,17 +205,19 @@ def test_what_a_reader_must_know_is_below_the_table(tmp_path: Path) -> None:
     warned = one(interval=interval(notes=("4 items: below 10.",), n_undefined=3))
     share = one(coefficient="percent_agreement")
     (_, *rows), cells, text = shown(tmp_path, nan, lost, warned, share)
-    assert [row[5] for row in rows] == ["undefined", "–", "0.626", "0.626"]
+    assert [row[1] for row in rows[:4]] == ["undefined", "–", "0.626", "0.626"]
     words = [row["strength"] for row in cells]
     assert words == ["", "", "fair", ""]  # of a kappa that has a value
-    assert rows[1][6] == "not in these data"
+    assert rows[1][2] == "not in these data"
     assert (cells[1]["reason"], cells[1]["value"]) == ("there are no ratings", "")
-    assert rows[3][1] == "Percent agreement (0–1)"
+    assert cells[3]["coefficient"] == "Percent agreement (0–1)"
     for note in (
-        "kappa: all ratings are in one category.",
-        "lost: there are no ratings.",
-        "kappa: 4 items: below 10.",
-        "kappa: undefined on 3 resamples.",
+        "\n\nNot in these data: there are no ratings.\n",
+        "\n\nUndefined: all ratings are in one category.\n",
+        " models: all ratings are in one category.",
+        "Fleiss' κ, standard models: there are no ratings.",
+        " models: 4 items: below 10.",
+        " models: undefined on 3 resamples.",
     ):
         assert note in text
 

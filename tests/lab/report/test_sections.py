@@ -229,39 +229,40 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     ),
     "a grade that nobody gave": (
         study(plan(), sections=("categories",)), table_v(),
-        ["| 0 | 0 | – | – | – | – |",
-         "The intervals are wide, as they rest on 4 models."],
+        ["| 0 | 0 | – | – | – |", "| 1 | 9 | 0.698 | 4 models are too few | 0.580 |"],
     ),
     "the word that agree has for it, whose interval ends in 'fair'": (
         study(plan(interval="posterior", target="items"), sections=("agreement",)),
-        table_v(), ["| [0.370, 0.874] ᵃ | moderate |", "by its interval (one-sided)"],
+        table_v(),
+        ["| [0.370, 0.874] | 4 | 8 | 95 % credible, Dirichlet-multinomial posterior, "
+         "exact | other models | test | moderate |", "by its interval (one-sided)"],
     ),
     "no estimate, so no grade": (
         study(sections=("categories",)), table_v(),
-        ["Not in these data: the plan asks for no estimate of agreement between"],
+        ["Not in these data: agreement on each grade (the plan asks for no estimate"],
     ),
     "no estimate in the data": (
         study(plan(models="dummy"), sections=("categories", "agreement")), table_v(),
         ["Not in these data: no dummy model has ratings in session test.",
-         "line is not in these data: no dummy model has ratings in session test."],
+         "| Fleiss' κ, dummy models | – | not in these data | – | – |",
+         "in these data: agreement on each grade (no dummy model has ratings in"],
     ),
     "no aims": (
         study(sections=("confusion",)),
         ratings(("test", "R1", "D01", "1"), ("test", "R2", "D01", "1")),
-        ["Not in these data: no model with an intended grade has ratings."],
+        ["data: grades by intended one (no model with an intended grade has ratings)."],
     ),
     "no order": (
         study(plan(), sections=("order",)), table_v(),
-        ["Not in these data: neither are the places"],
+        ["Not in these data: effects of order (neither are the places"],
     ),
     "nobody in person": (
         study(sections=("in-person",)), ONE,
-        ["Not in these data: no grades given in person belong to these ratings."],
+        ["in-person and haptic grades (no grades given in person belong to these"],
     ),
     "no speed": (
         study(sections=("speeds", "traces")), ONE,
-        ["Stretching speeds\n\n*Not in these data: no rating comes with a stretching s",
-         "Torque traces\n\n*Not in these data: no rating comes with a stretching"],
+        ["stretching speeds (no rating comes with a stretching speed); torque traces"],
     ),
     "speeds that are not known": (
         study(sections=("speeds",)),
@@ -279,7 +280,7 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     ),
     "claims, by another command": (
         study(sections=("claims",)), table_v(),
-        ["masrel audit holds ratings/claims.csv"],
+        ["of agreement between raters.\n\n## Provenance"],
     ),
     "recorded ratings": (
         study(sections=()), ratings(("test", "R1", "HM1", "1"), source="recorded"),
@@ -301,7 +302,8 @@ def test_what_was_not_computed_is_said_to_be_so(tmp_path: Path) -> None:
     analysis = analyze(protocol_with(), rows)
     asked = protocol_with(sections=("intended",))
     files = write_report(asked, rows, analysis, tmp_path)
-    assert "Not in these data: this was not computed." in page(files)
+    text = "agreement with the intended grade (this was not computed)."
+    assert f"Not in these data: {text}" in page(files)
 
 
 def test_only_a_study_that_says_its_size_has_the_section() -> None:
@@ -407,7 +409,8 @@ def test_grades_are_counted_by_the_intended_one(tmp_path: Path) -> None:
         ("| 2 | 0 | 0 | 0 | 1 | 1 | 0 | 2 | 50.0 |", (1.26, 98.74)),
         ("| 3 | 0 | 0 | 0 | 0 | 1 | 1 | 2 | 50.0 |", (1.26, 98.74)),
     ):
-        assert f"{line} {ends[0]:.1f} | {ends[1]:.1f} |" in text
+        shown = f"[{ends[0]:.1f}, {ends[1]:.1f}]"
+        assert f"{line} {'2 raters are too few' if ends[0] < 5 else shown} |" in text
     assert "Of 8 grades of models with an intended grade, 5 are the intended" in text
     without = page(written(tmp_path / "one", protocol, rows, excluded=["R2"]))
     assert "Of 4 grades" in without
@@ -447,8 +450,11 @@ def test_methods_cite_what_was_used_and_list_just_that(tmp_path: Path) -> None:
         plan(id="lost", coefficient="gwet_ac", models="dummy", interval="bootstrap"),
     )
     protocol = protocol_with(*lines, sections=("methods",))
-    text = page(written(tmp_path / "used", protocol, table_v()))
-    keys = re.findall(r"^@\w+\{(\w+),", text, re.M)
+    files = written(tmp_path / "used", protocol, table_v())
+    text = page(files)
+    bibtex = files.html.with_name("references.bib").read_text(encoding="utf-8")
+    keys = re.findall(r"^@\w+\{(\w+),", bibtex, re.M)
+    assert text.count("https://doi.org/") == len(keys)
     used = {"bohannon1987", "park2012", "fleiss1971", "efron1981", "landis1977"}
     assert set(keys) == used
     assert "Fleiss' κ (Fleiss, 1971) and percent agreement" in text
@@ -562,4 +568,4 @@ def test_agreement_of_one_rater_counts_one(tmp_path: Path) -> None:
     assert [(row["id"], row["n_raters"]) for row in rows[:1]] == [("again: R1", "1")]
     assert rows[0]["sessions"] == "test and retest"
     (svg,) = (path for path in files.figures if path.suffix == ".svg")
-    assert "models, twice" in svg.read_text(encoding="utf-8")
+    assert "R1, Cohen" in svg.read_text(encoding="utf-8")
