@@ -150,7 +150,7 @@ def label_codes(
 def warn_of_texts(labels: Sequence[Label], codes: Codes, *, declared: bool) -> None:
     """Warn of labels that nobody declared, and that astype(str) leaves."""
     doubtful = [
-        f"{label!r} ({np.count_nonzero(codes == code)} times)"
+        f"{label!r} ×{np.count_nonzero(codes == code)}"
         for code, label in enumerate(labels)
         if label in _TEXTS_OF_NOTHING and not declared
     ]

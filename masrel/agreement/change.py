@@ -410,7 +410,7 @@ def kappa_max(table: ArrayLike) -> float:
 
 
 def specific_agreement(table: ArrayLike) -> tuple[float, ...]:
-    """Return for each category how often a rating of it meets the same of the other.
+    """Return how often, where one rater chose a category, the other did so, too.
 
     Parameters
     ----------

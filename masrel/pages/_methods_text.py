@@ -85,8 +85,8 @@ _WITHOUT = _Text(
 )
 _SPECIFIC = (
     _Text(
-        "Agreement on a grade is specific agreement, the share of the ratings in it "
-        "that meets the same of another rater{}.",
+        "Agreement on a grade is specific agreement: how often, where one rater gave "
+        "the grade, another rater gave it too{}.",
         ("cicchetti1990",),
     ),
     _Text(

@@ -406,13 +406,13 @@ _TEXTS = {
     "no rating": "needed ratings of {field}, got none",
     "xpt": "is damaged, or no .xpt file (needed lines of 80 bytes)",
     # columns
-    "no column": "{option}: there is no column {column!r}, {columns}{hint}",
+    "no column": "{option}: there is no column {column!r}; there are {columns}{hint}",
     "two roles": "{options}: needed each column once, got {column!r} twice",
     "role twice": "{where}: needed one column for the {role}, got {names}: --{role} "
     "chooses one, --ignore leaves a column aside{hint}",
-    "unknown role": "{where}: looks like one row a rating ({known}): needs {needed}, "
-    "{columns}; if its columns are raters, --raters names them, if they are items, "
-    "--transpose{hint}",
+    "unknown role": "{where}: looks like one row a rating ({known}): needs {needed} to "
+    "name columns, which are {columns}; if columns are raters, --raters names them, if "
+    "they are items, --transpose{hint}",
     "no rater": "{where}: needed columns of raters, or of categories, got none",
     "span columns": "{begin!r} and {end!r} look like where spans begin and end, parts "
     "of a text or a recording, which are not read; --item names the items, if all "

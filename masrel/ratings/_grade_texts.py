@@ -492,7 +492,7 @@ def _doubts(
         freq[grade_of[text]] += n
     findings = []
     for group in spelled_alike(list(freq)):
-        grades = ", ".join(f"{text!r} ({freq[text]} times)" for text in group)
+        grades = ", ".join(f"{text!r} ×{freq[text]}" for text in group)
         findings.append(Finding("alike grades", grades=grades))
     numbers = [text for text in met if number[text] is not None]
     others = [text for text in met if number[text] is None]
@@ -544,7 +544,7 @@ def _far_codes(grades: Sequence[str], freq: dict[str, int]) -> list[Finding]:
             is_off_scale = rest[0] <= _SCALE and gap > max(2 * step, 2)
             if is_odd or is_off_scale or gap >= rest[0] + 1:
                 far = sorted(order[:n_far], key=Decimal)
-                named = ", ".join(f"{g} ({freq[g]} times)" for g in far)
+                named = ", ".join(f"{g} ×{freq[g]}" for g in far)
                 findings.append(Finding("far", grades=named, hint=_hint(far, freq)))
                 break
     return findings

@@ -175,7 +175,7 @@ def _columns_of(
                     "no column",
                     option=f"--{option}",
                     column=joined[-1],
-                    columns=f"but {listed(sheet.header, 12)}",
+                    columns=listed(sheet.header, 12),
                     **({"hint": f"; did you mean {near[0]!r}?"} if near else {}),
                 )
             same = [place for place, n in enumerate(sheet.header) if n == name]
@@ -235,7 +235,7 @@ def _long(
             where=sheet.at(0),
             known=", ".join(known),
             needed=" and ".join(f"--{role}" for role in unknown),
-            columns=f"but {listed(header, 12)}",
+            columns=listed(header, 12),
         )
     item, raters, grades = roles.values()
     if sheet.has_header and not options.names_at:

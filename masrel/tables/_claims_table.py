@@ -30,9 +30,8 @@ _READING_COLUMNS = (
 )
 
 _COUNTED = (
-    "A table and its transpose are two; no more than 10 000 are counted. Where there "
-    "is none, the numbers do not belong to one table as they were read; it is not said "
-    "why."
+    "A table and its transpose are two; no more than 10 000 are counted. Where none "
+    "fits, the numbers cannot all be of one table as they were read; why is not said."
 )
 
 

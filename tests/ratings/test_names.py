@@ -148,7 +148,11 @@ def test_a_refusal_names_the_option_that_reads_the_table(
     [
         (TABLE, {"skip": 9}, "--skip.* line 10"),
         (TABLE, {"header": (4, 9)}, "--header.* line 9"),
-        (TABLE, {"header": (1, 2), "item": "patient"}, "'patient', but 'patient P1'"),
+        (
+            TABLE,
+            {"header": (1, 2), "item": "patient"},
+            "'patient'; there are 'patient P1'",
+        ),
         # what is named by the caller is no title, and no note has no letter
         (f"{TABLE}\nSource: ward 4, 2024\n", {}, "line 6: needed 4 cells"),
         (f"{TABLE}\n7\n", {}, "line 6: needed 4 cells"),
