@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +27,6 @@ from masrel.pages._sections import (
     Section,
     chapters,
     html_page,
-    narrow,
 )
 from masrel.plots._drawn_values import Drawn
 from masrel.ratings import RatingsFile
@@ -148,7 +146,7 @@ def _result_section(
     file: RatingsFile, questions: Questions, answers: Sequence[Answer], items: str
 ) -> Section:
     first, *more = (
-        narrow(_with_interval(table, questions.level))
+        _with_interval(table, questions.level)
         for table in first_screen(
             file, questions, answers, detail="all", items=items, is_text=False
         )
@@ -158,14 +156,14 @@ def _result_section(
         notes.append(_NO_INTERVAL)
     forest = forest_drawing(answers, questions)
     blocks: list[Content] = [
-        *first,
+        first,
         *([] if forest is None else [forest]),
         *(Paragraph(text=text, absent=True) for text in notes),
     ]
     if questions.command in _TITLES:  # which have an answer of their own
-        blocks = [*chain(*more), *blocks]
+        blocks = [*more, *blocks]
     else:
-        blocks += chain(*more)
+        blocks += more
     return Section(name="result", title="Result", blocks=tuple(blocks))
 
 

@@ -3,7 +3,6 @@
 In: sections of paragraphs, tables, pictures and references. Out: HTML.
 """
 
-import base64
 import html
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -72,9 +71,15 @@ class Block:
 
     number: str
     content: Content
-    # of a figure: its bytes, and its file from the report's folder, by form (png, svg)
+    # of a figure: its bytes by form (inline, png, svg), and, by form, its file from the
+    # report's folder
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def tables(self) -> list[Table]:
+        """Itself in parts that no document is too narrow for, if it is a table."""
+        return narrow(self.content) if isinstance(self.content, Table) else []
 
     @property
     def kind(self) -> str:
@@ -107,17 +112,22 @@ class Document:
     supplement: tuple[Chapter, ...] = ()
 
 
-_LETTERS = 112  # of a line of a table on paper
+_LETTERS = 106  # of a line of a table on paper
+_WRAPPED = 24  # of a text that goes on in the next line
 
 
 def narrow(table: Table) -> list[Table]:
     """Return a table in parts for which paper is wide enough, each with its names."""
     columns, rows = page_cells(table)
-    widths = [
-        2 + max(map(len, (*column.heading.split(), *(row[at] for row in rows))))
-        for at, column in enumerate(columns)
-    ]
-    n_names = next((at for at, of in enumerate(columns) if of.align != "left"), 1) or 1
+    widths = []
+    for column, *cells in zip(columns, *rows, strict=True):
+        # a number stays in one line
+        wraps = column.align != "right"
+        least = min(_WRAPPED * wraps or _LETTERS, max(map(len, cells), default=0))
+        words = " ".join((column.heading, *(cells if wraps else ()))).split()
+        widths.append(2 + max(least, *map(len, words)))
+    names = (len({tuple(row[:n]) for row in rows}) for n in range(1, len(columns)))
+    n_names = next((n for n, of in enumerate(names, 1) if of == len(rows)), 1)
     room = used = max(_LETTERS - sum(widths[:n_names]), _LETTERS // 2)
     parts: list[set[str]] = []
     for column, width in zip(columns[n_names:], widths[n_names:], strict=True):
@@ -185,18 +195,11 @@ def html_page(document: Document) -> str:
     environment.filters |= {
         "symbols": _symbols,
         "cells": page_cells,
-        "uri": _uri,
         "svg": _svg,
     }
     style = (TEMPLATES / "page.css").read_text(encoding="utf-8")
     template = environment.get_template("page.html")
     return template.render(document=document, style=style)
-
-
-def _uri(picture: bytes) -> str:
-    # An image of its own, not inline: ids inside two SVGs would collide.
-    encoded = base64.b64encode(picture).decode("ascii")
-    return f"data:image/svg+xml;base64,{encoded}"
 
 
 def _svg(picture: bytes, alt: str) -> str:

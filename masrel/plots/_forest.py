@@ -6,7 +6,10 @@ others are put together in bars, of one width in a row, so that a point mass is 
 smeared and a stem and a bar of one height are one share.
 """
 
+import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, Literal
@@ -36,8 +39,9 @@ from masrel.plots._style import (
 from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import percent
 
-# Heights in inches: of a line of text, of a line below it, of a ridge and a heading.
-_LINE, _DETAIL, _RIDGE, _GROUP = 0.25, 0.14, 0.34, 0.28
+# Inches: the width, whose letters can be read on a telephone; heights of a row, of each
+# further line of its label and each of its detail, of a ridge and a heading
+_WIDTH, _LINE, _MORE, _RIDGE, _GROUP = 5.4, 0.25, 0.14, 0.34, 0.28
 
 _LEFT, _RIGHT = -1.0, 1.03  # the axis goes no further: what does is an arrow at its end
 
@@ -142,6 +146,10 @@ def forest(
 
 def forest_picture(rows: Sequence[ForestRow], axis_label: str) -> Picture:
     """Return estimates with their intervals as a picture."""
+    fill = partial(textwrap.fill, break_on_hyphens=False)
+    rows = [
+        replace(r, label=fill(r.label, 26), detail=fill(r.detail, 28)) for r in rows
+    ]
     ridges = [_ridge(row.interval) for row in rows]
     handles = _legend_handles(rows, ridges)
 
@@ -166,15 +174,20 @@ def forest_picture(rows: Sequence[ForestRow], axis_label: str) -> Picture:
         legend_below(axes, handles, numpoints=2, handler_map=dots)
 
     height = sum(_heights(rows, ridges)) + 0.65 + 0.17 * len(handles)
-    return Picture(7.2, height, draw)
+    return Picture(_WIDTH, height, draw)
+
+
+def _beside(row: ForestRow) -> tuple[float, float]:
+    # inches of a label, and of its detail
+    label = _LINE + _MORE * row.label.count("\n")
+    return label, _MORE * len(row.detail.splitlines())
 
 
 def _heights(rows: Sequence[ForestRow], ridges: Sequence[_Ridge]) -> list[float]:
     # inches of every row, with the heading above the first of a group
     groups = ["", *(row.group for row in rows)]
     return [
-        _LINE
-        + (_DETAIL if row.detail else 0.0)
+        sum(_beside(row))
         + (_RIDGE if ridge else 0.0)
         + (_GROUP if row.group and row.group != before else 0.0)
         for row, ridge, before in zip(rows, ridges, groups, strict=False)
@@ -192,8 +205,7 @@ def _draw_rows(
         if row.group and row.group != group:
             _at_left(axes, top + 0.6 * _GROUP, row.group, weight="bold")
         group = row.group
-        text = _LINE + (_DETAIL if row.detail else 0.0)
-        _draw_row(axes, row, ridge, bottom - 0.5 * text)
+        _draw_row(axes, row, ridge, bottom - sum(_beside(row)) / 2.0)
         spans.append((row.has_zero, top, bottom))
     # where rows next to each other have a zero: one line for all of them
     for has_zero, of_both in groupby(spans, key=itemgetter(0)):
@@ -205,6 +217,7 @@ def _draw_rows(
 
 def _draw_row(axes: Axes, row: ForestRow, ridge: _Ridge, y: float) -> None:
     left, interval = axes.get_xlim()[0], row.interval
+    above, below = _beside(row)
     if ridge:
         base, top = y - 0.3 * _LINE, y - 0.3 * _LINE - 0.95 * _RIDGE
         _draw_ridge(axes, ridge, base=base, top=top)
@@ -218,9 +231,10 @@ def _draw_row(axes: Axes, row: ForestRow, ridge: _Ridge, y: float) -> None:
         inside = min(max(row.value, left), _RIGHT)
         marker = "o" if inside == row.value else "<" if row.value < left else ">"
         axes.plot([inside], [y], clip_on=False, **{**_DOT, "marker": marker})
-    _at_left(axes, y, row.label, lifted=5.0 if row.detail else 0.0)
+    _at_left(axes, y, row.label, lifted=36.0 * below)
     if row.detail:
-        _at_left(axes, y, row.detail, lifted=-5.5, color=GREY, fontsize=7.5)
+        lifted = 3.5 - 36.0 * above
+        _at_left(axes, y, row.detail, lifted=lifted, color=GREY, fontsize=7.5)
     axes.annotate(
         row.text,
         (1.0, y),

@@ -56,6 +56,9 @@ SEQUENTIAL = LinearSegmentedColormap.from_list(
 DASHES = (0, (4, 3))
 """Line style of what is a reference, not data."""
 
+BANDS = ("#E9EFF5", "#C9D9E8")
+"""Ground of where most, and where half, of many lines are."""
+
 SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 """Background of each phase of a stretch."""
 
@@ -98,6 +101,9 @@ _OF_PAGE = {  # colours that follow the page into the dark
     GREY: "var(--soft)",
     PAGE: "var(--page)",
     GRID: "var(--rule)",
+    ALARM: "var(--alarm)",
+    BANDS[0]: "var(--band)",
+    BANDS[1]: "var(--middle)",
 }
 
 _MAX_LETTERS = 22  # of a name
@@ -240,7 +246,7 @@ def _printed(figure: Figure, form: Form) -> bytes:
 
 def _inlined(svg: str) -> str:
     """Return the element of an SVG, its colours those of the page around it."""
-    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg[svg.index("<svg") :])
     for colour, of_page in _OF_PAGE.items():
         svg = svg.replace(colour.lower(), of_page)
     # names of their own, as several stand in one page

@@ -57,6 +57,7 @@ from masrel.pages._sections import (
     chapters,
 )
 from masrel.plots import draw
+from masrel.plots._drawn_values import Form
 from masrel.tables._tables import Table, as_csv, tag_of
 
 Progress = Callable[[str], object]
@@ -323,14 +324,15 @@ def _block(
         assets[REFERENCES] = content.bibtex.encode()
     if not isinstance(content, Drawing):
         return Block(number=number, content=content)
-    drawn = draw(content.content, stamp=content.stamp)
+    forms: tuple[Form, ...] = ("png", "svg", "inline")
+    drawn = draw(content.content, stamp=content.stamp, forms=forms)
     if progress is not None:
         progress(content.name)
     pictures = {str(form): picture for form, picture in drawn.items()}
-    files = {
-        form: _new_place(assets, f"figures/{content.name}", form) for form in pictures
+    files: dict[str, str] = {
+        form: _new_place(assets, f"figures/{content.name}", form) for form in forms[:2]
     }
-    assets.update({files[form]: picture for form, picture in pictures.items()})
+    assets.update({place: pictures[form] for form, place in files.items()})
     return Block(number=number, content=content, pictures=pictures, files=files)
 
 

@@ -15,12 +15,7 @@ from typing import Literal
 
 from masrel._files import write_file
 from masrel.errors import ParameterError
-from masrel.pages._sections import (
-    Document,
-    html_page,
-    narrow,
-    template_environment,
-)
+from masrel.pages._sections import Document, html_page, template_environment
 from masrel.tables._latex import in_math
 from masrel.tables._tables import Column, page_cells
 
@@ -37,7 +32,6 @@ def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
             return in_math(as_markdown(text).replace("$", r"\$"))
 
     environment.filters |= {"md": escape, "cells": page_cells, "rule": _rule}
-    environment.filters |= {"narrow": narrow}  # no wider than paper
     template = environment.get_template("report.md")
     return template.render(document=document, form=form)
 

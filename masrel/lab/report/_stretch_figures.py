@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from masrel.plots._style import (
+    BANDS,
     BLACK,
     BLUE,
     DASHES,
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 _SMALL_IN_A_ROW = 4
 _GRADED = 2.2  # times as wide is a line of a stretch that a grade rests on
 # of where most of many stretches are: the outer pair of ends, and the inner one
-_BAND = {"middle 90 %": "#E9EFF5", "middle 50 %": "#C9D9E8"}
+_BAND = dict(zip(("middle 90 %", "middle 50 %"), BANDS, strict=True))
 
 _Floats = NDArray[np.float64]
 TracePanel = tuple[

@@ -198,10 +198,10 @@ def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -
         content=learning_content(record, level=level),
         stamp=training_stamp(record, protocol.study.id),
     )
-    picture = draw(drawing.content, stamp=drawing.stamp, forms=("svg",))["svg"]
+    picture = draw(drawing.content, stamp=drawing.stamp, forms=("inline",))["inline"]
     blocks = (
         Block(number="1", content=Paragraph(text=NOT_RATINGS)),
-        Block(number="1", content=drawing, pictures={"svg": picture}),
+        Block(number="1", content=drawing, pictures={"inline": picture}),
         Block(number="1", content=curve),
         Block(number="2", content=confusion),
     )

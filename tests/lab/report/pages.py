@@ -148,7 +148,7 @@ class Page(HTMLParser):
         elif tag in ("caption", "figcaption", "h1", "h2"):
             self._into = self.captions if "caption" in tag else self.headings
             self._into.append("")
-        elif tag == "img":
+        elif known.get("role") == "img":
             self.images.append(known)
         self.links += [
             v for n, v in known.items() if n in ("href", "src", "xlink:href")
