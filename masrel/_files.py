@@ -73,11 +73,10 @@ def write_files(
     parts: dict[Path, Path] = {}
     try:
         for path, data in contents.items():
-            if data is None:
-                continue
-            parts[path], descriptor = new_part(path, within, mode)
-            with on_disk(path, descriptor) as out:
-                out.write(data.encode() if isinstance(data, str) else data)
+            if data is not None:
+                parts[path], descriptor = new_part(path, within, mode)
+                with on_disk(path, descriptor) as out:
+                    out.write(data.encode() if isinstance(data, str) else data)
         for path in contents:
             with naming(path):
                 if path in parts:

@@ -48,23 +48,18 @@ MAX_TABLE = 64_000_000
 # of a recording, and of what one is unpacked to: half an hour at 1 kHz
 MAX_RECORDING = 128_000_000
 
-MANIFEST = "manifest.json"
-"""What names every file of a report with its hash."""
-
-UNFINISHED = "unfinished.json"
-"""What stands in a report instead while it is made: the files that may be its own."""
-
+# What names every file of a report with its hash; what stands there while it is made
+MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
 CUT_OFF = "was cut off while it was made; masrel report makes it anew"
-
-_PAGES = ("report.html", "report.md", "report.tex", "report.docx")
 
 
 def is_cut_off(report: Path) -> bool:
     """Return whether a report was not finished: its manifest comes last."""
     # also where somebody has taken the manifest away
-    names = (UNFINISHED, *_PAGES)
-    there = any((report / name).is_file() for name in names)
-    return there and not (report / MANIFEST).is_file()
+    names = (UNFINISHED, "report.html", "report.md", "report.tex", "report.docx")
+    return not (report / MANIFEST).is_file() and any(
+        (report / name).is_file() for name in names
+    )
 
 
 # of a file that grows while it is read

@@ -9,7 +9,6 @@ smeared and a stem and a bar of one height are one share.
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, Literal
@@ -146,9 +145,14 @@ def forest(
 
 def forest_picture(rows: Sequence[ForestRow], axis_label: str) -> Picture:
     """Return estimates with their intervals as a picture."""
-    fill = partial(textwrap.fill, break_on_hyphens=False)
+    how: dict[str, Any] = {"break_on_hyphens": False}
     rows = [
-        replace(r, label=fill(r.label, 26), detail=fill(r.detail, 28)) for r in rows
+        replace(
+            row,
+            label=textwrap.fill(row.label, 26, **how),
+            detail=textwrap.fill(row.detail, 28, **how),
+        )
+        for row in rows
     ]
     ridges = [_ridge(row.interval) for row in rows]
     handles = _legend_handles(rows, ridges)

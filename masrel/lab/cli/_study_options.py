@@ -11,7 +11,7 @@ import click
 
 from masrel.cli._options import Command, Decorator, echo_notes
 from masrel.cli._paths import InputFile, note_inputs
-from masrel.errors import MasrelWarning
+from masrel.errors import MasrelWarning, MissingLettersWarning
 
 if TYPE_CHECKING:
     from masrel.lab.protocol import Protocol
@@ -142,8 +142,13 @@ def warnings_as_notes() -> Iterator[None]:
         try:
             yield
         finally:
-            messages = {str(w.message): None for w in caught if _is_ours(w)}
-            echo_notes(tuple(f"note: {message}" for message in messages))
+            ours = [w.message for w in caught if _is_ours(w)]
+            # letters that no font has are said of all figures at once
+            letters = {of for each in ours for of in getattr(each, "letters", ())}
+            others = [of for of in ours if not isinstance(of, MissingLettersWarning)]
+            others += [MissingLettersWarning(letters)] * bool(letters)
+            notes = dict.fromkeys(f"note: {message}" for message in others)
+            echo_notes(tuple(notes))
     for warning in caught:
         if not _is_ours(warning):
             warnings.warn_explicit(

@@ -64,12 +64,9 @@ class _CompareOptions:
     exact: bool
 
     def __post_init__(self) -> None:
-        for name in ("no_change", "exact"):
-            if getattr(self, name) and self.against is None:
-                option = f"--{name.replace('_', '-')}"
-                raise ParameterError(
-                    f"{option}: needs --against, the report to compare"
-                )
+        if (self.no_change or self.exact) and self.against is None:
+            option = "--no-change" if self.no_change else "--exact"
+            raise ParameterError(f"{option}: needs --against, the report to compare")
 
     def read(self, study: Path) -> dict[str, Any] | None:
         """Return the older analysis of a study; None if nothing is to be compared."""

@@ -6,14 +6,12 @@ and the hash of each in ``manifest.json``. The same inputs give the same bytes; 
 no time of day in any of them.
 """
 
-import warnings
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
 
-from masrel.errors import MissingLettersWarning
 from masrel.lab._study_files import MANIFEST
 from masrel.lab.analysis import Analysis
 from masrel.lab.analysis._results import analysis_text
@@ -47,7 +45,6 @@ from masrel.lab.report._trace_section import speeds_section, traces_section
 from masrel.lab.verification import Anchor
 from masrel.pages._sections import (
     Block,
-    Chapter,
     Content,
     Document,
     Drawing,
@@ -251,21 +248,21 @@ def make_report(
     names = [n for n in section_names(protocol) if not only or n in only]
     assets, inputs = dict[str, bytes](), dict(analysis.inputs)
     block = partial(_block, assets, progress, raw_csv)
-    main, supplement = _chapters(*_parts(names, material), block)
+    main, supplement = _parts(names, material)
     document = Document(
         title=protocol.report.title or protocol.study.title,
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
         result=result_text(material),
-        sections=main,
+        sections=chapters(main, block),
         # what the pages end with: the hash of everything they were made from
         inputs=(
             *((f"SHA-256 of the {_INPUTS[name]}", of) for name, of in inputs.items()),
             *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
         ),
         version=analysis.masrel_version,
-        supplement=supplement,
+        supplement=chapters(supplement, block, "S"),
     )
     every = {*protocol.report.formats, *formats}
     writers = [writer for name, writer in WRITERS.items() if name in every]
@@ -286,26 +283,6 @@ def section_names(protocol: Protocol) -> list[str]:
     # no protocol names them: they are there where there is anything to say
     names[place:place] = ("flow", "conduct")
     return names
-
-
-def _chapters(
-    main: Sequence[Section],
-    supplement: Sequence[Section],
-    block: Callable[[str, Content], Block],
-) -> tuple[tuple[Chapter, ...], tuple[Chapter, ...]]:
-    # letters that no font has are said of all figures at once
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        made = chapters(main, block), chapters(supplement, block, "S")
-    lacking: set[str] = set()
-    for message in (warning.message for warning in caught):
-        if isinstance(message, MissingLettersWarning):
-            lacking |= message.letters
-        else:
-            warnings.warn(message, stacklevel=3)
-    if lacking:
-        warnings.warn(MissingLettersWarning(lacking), stacklevel=3)
-    return made
 
 
 def _block(

@@ -79,9 +79,8 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
         known = _known_files(folder)
         for place, data in files.items():
             known.setdefault(place, []).append(_hash(data))
-        own = json.dumps({"format": 1, "files": known}, indent=1)
-        contents: dict[Path, bytes | None] = {
-            folder / UNFINISHED: own.encode(),
+        contents: dict[Path, bytes | str | None] = {
+            folder / UNFINISHED: json.dumps({"format": 1, "files": known}),
             folder / MANIFEST: None,
             **{folder / place: files[place] for place in changed if place != MANIFEST},
             **dict.fromkeys(stale),
@@ -127,16 +126,16 @@ def _known_files(folder: Path) -> dict[str, list[str]]:
     # manifest and the list say; nothing if there is none
     known: dict[str, list[str]] = {}
     for name in (MANIFEST, UNFINISHED):
-        with contextlib.suppress(*_UNREADABLE):
+        # it may be any JSON, or none
+        with contextlib.suppress(
+            OSError, ValueError, LookupError, TypeError, AttributeError
+        ):
             document = json.loads(read_regular(folder / name, most=MAX_TABLE))
             for place, hashes in document["files"].items():
                 known.setdefault(place, []).extend(
                     [hashes] if isinstance(hashes, str) else map(str, hashes)
                 )
     return known
-
-
-_UNREADABLE = (OSError, ValueError, LookupError, TypeError, AttributeError)
 
 
 def _stale_files(folder: Path, named: Collection[str]) -> Iterator[Path]:
