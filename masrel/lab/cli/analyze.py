@@ -66,13 +66,16 @@ def analyze(
 
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
+    from masrel.lab.report import study_conduct
     from masrel.lab.report._document import made_section
     from masrel.lab.report._grade_sections import felt_sentences
     from masrel.lab.report._material import gather
     from masrel.pages._sections import Paragraph
     from masrel.tables._tables import Table, as_csv, as_text
 
-    material = gather(data.protocol, data.ratings, analysis, data.in_person)
+    conduct = study_conduct(data.paths, data.protocol)
+    of_study = (data.protocol, data.ratings, analysis, data.in_person)
+    material = gather(*of_study, conduct=conduct)
     felt = felt_sentences(material)
     if felt:
         click.echo(textwrap.fill(felt, 88) + "\n", err=csv)

@@ -58,7 +58,7 @@ def felt_sentences(material: Material) -> str:
     if made.n_stretches != made.n_presentations:
         mean = number(made.n_stretches / made.n_presentations, 1)
         sentences.append(
-            f"Raters stretched the arm {made.n_stretches} times in "
+            f"The arm was stretched {made.n_stretches} times in "
             f"{counted(made.n_presentations, 'presentation')}, {mean} times each."
         )
     if n_slow:

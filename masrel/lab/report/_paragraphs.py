@@ -21,6 +21,7 @@ from masrel.lab.report._material import (
     SUPPLEMENT,
     Material,
     coefficient_name,
+    estimate_titles,
     lines_of,
     macros,
     main_estimate,
@@ -120,7 +121,8 @@ def methods_section(material: Material) -> Iterator[Content]:
         return list(dict.fromkeys(map("".join, named)))
 
     known = [planned for planned in analysis.estimates if _is_known(planned)]
-    estimates = [(p.line, of) for p in known for of in _estimates(p)]
+    titles = estimate_titles([planned.line for planned in analysis.estimates])
+    estimates = [(titles[p.line.id], of) for p in known for of in _estimates(p)]
     say = _macros(
         protocol,
         material=material,
@@ -128,6 +130,7 @@ def methods_section(material: Material) -> Iterator[Content]:
         cite=cite,
         coefficients=coefficients,
         known=known,
+        titles=titles,
         has_words=any(
             COEFFICIENTS[e.coefficient].chance_corrected for _, e in estimates
         ),
@@ -196,14 +199,14 @@ def _sections(material: Material) -> list[str]:
 
 
 def _alike(
-    estimates: Sequence[tuple[EstimatePlan, Estimate]],
+    estimates: Sequence[tuple[str, Estimate]],
 ) -> list[tuple[Interval, list[str]]]:
-    # one interval of each kind, with the lines whose estimates have such
+    # one interval of each kind, with the titles of the estimates that have such
     alike: dict[tuple[object, ...], tuple[Interval, list[str]]] = {}
-    for line, estimate in estimates:
+    for title, estimate in estimates:
         interval = estimate.interval
         if interval is not None and not math.isnan(interval.low):
             kind = (interval.level, interval.kind, interval.method, interval.target)
-            _, lines = alike.setdefault((*kind, interval.prior), (interval, []))
-            lines += [line.id] * (line.id not in lines)
+            _, titles = alike.setdefault((*kind, interval.prior), (interval, []))
+            titles += [title] * (title not in titles)
     return list(alike.values())

@@ -458,7 +458,8 @@ def test_methods_cite_what_was_used_and_list_just_that(tmp_path: Path) -> None:
     used = {"bohannon1987", "park2012", "fleiss1971", "efron1981", "landis1977"}
     assert set(keys) == used
     assert "Fleiss' κ (Fleiss, 1971) and percent agreement" in text
-    assert "(kappa) are by rater jackknife, t(7) (Efron & Stein, 1981)." in text
+    of_kappa = "(Fleiss' κ, standard models) are by rater jackknife, t(7)"
+    assert f"{of_kappa} (Efron & Stein, 1981)." in text
     cited = re.findall(r"\(([A-Z][^()]*, \d{4})\)", text)
     assert len(set(cited)) == len(keys)
     assert f"with masrel {masrel.__version__} (numpy {version('numpy')}, scipy " in text
@@ -471,7 +472,7 @@ def test_methods_say_who_is_excluded_and_what_is_missing(tmp_path: Path) -> None
     protocol = study(plan(), sections=("methods", "categories"))
     text = page(written(tmp_path, protocol, rows, excluded=["R3"]))
     assert "R3 is excluded from every number." in text
-    assert "1 of line are missing" in text
+    assert "are missing (1 of Fleiss' κ, standard models)" in text
     assert "specific agreement (Cicchetti & Feinstein, 1990)" in text
 
 
