@@ -68,6 +68,7 @@ _HUES = (
 
 _MAX_SHADES = 12  # ordered grades that have a shade each
 _MAX_LETTERS = 6  # of a grade in a cell
+_MAX_LEGEND = 60  # of a grade in the legend
 _MAX_COUNTED = 20  # grades up to which counts are written in a table of two raters
 _INTENDED = -1.3  # where intended grades stand; raters are at 0, 1, 2, ...
 _ACROSS, _DOWN = 7.0, 9.0  # inches of many columns, and of many rows
@@ -540,7 +541,7 @@ def _grouped(
             "" if len(names) > 1 else names[0] if is_short else f"{place + 1}"
         )
         if len(names) == 1:
-            name = short_name(names[0])
+            name = short_name(names[0], _MAX_LEGEND)
             texts.append(name if is_short else f"{place + 1} = {name}")
         else:
             together = f"{names[0]} to {names[-1]}" if is_ordered else ""

@@ -109,12 +109,12 @@ _OF_PAGE = {  # colours that follow the page into the dark
 _MAX_LETTERS = 22  # of a name
 
 
-def short_name(name: str) -> str:
+def short_name(name: str, most: int = _MAX_LETTERS) -> str:
     """Return a name that has room at an axis: the middle of a long one goes."""
     # names often differ at their end
-    if len(name) <= _MAX_LETTERS:
+    if len(name) <= most:
         return name
-    half = (_MAX_LETTERS - 1) // 2
+    half = (most - 1) // 2
     return f"{name[:half]}…{name[-half:]}"
 
 

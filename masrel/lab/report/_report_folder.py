@@ -142,10 +142,10 @@ def _stale_files(folder: Path, named: Collection[str]) -> Iterator[Path]:
     # files of a report before, which this one does not name; only if nobody has written
     # in them since
     for place, hashes in _known_files(folder).items():
-        own = _OWN.fullmatch(place)
-        if own is None or place in named or (own[1] and (folder / own[1]).is_symlink()):
+        match = _OWN.fullmatch(place)
+        if match is None or place in named or _differs(folder / place, hashes):
             continue
-        if not _differs(folder / place, hashes):
+        if match[1] is None or not (folder / match[1]).is_symlink():
             yield folder / place
 
 
