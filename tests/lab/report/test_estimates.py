@@ -116,12 +116,6 @@ def test_a_result_is_told_with_what_it_rests_on(what: str, tmp_path: Path) -> No
         assert said in text
 
 
-def test_excluded_raters_are_named(tmp_path: Path) -> None:
-    text = result_of(table_v(), tmp_path, plan(), excluded=["R3"])
-    assert "7 of 8 raters" in text
-    assert text.endswith("None of this counts the grades of R3, who is excluded.")
-
-
 def interval(**changes: Any) -> Interval:
     made: dict[str, Any] = {"low": 0.31957, "high": 0.93252, "level": 0.95}
     made |= {"kind": "confidence", "method": "jackknife, t(7)", "target": "raters"}

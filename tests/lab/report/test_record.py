@@ -7,21 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab.analysis import analyze
-from masrel.lab.conduct import (
-    allot_schedules,
-    record_amendment,
-    record_standing,
-    record_unblinding,
-)
-from masrel.lab.paper import enter_sheet
+from masrel.lab import analysis, conduct, paper, ratings, report, run
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.ratings import read_study_data
-from masrel.lab.report import study_conduct
-from masrel.lab.report._document import made_section
-from masrel.lab.report._material import Material, gather
-from masrel.lab.report._paragraphs import result_text
-from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.report import _document, _material, _paragraphs
 from masrel.tables._tables import tag_of
 from tests.lab.paper.test_entry import filled, typed
 from tests.lab.run.conftest import PROTOCOL
@@ -42,10 +30,14 @@ break_minutes = 1.0
 
 [schedule]
 scheme = "latin-square\""""
+MORE = {"run": PLAN, "of another scheme": PLAN.replace("[schedule]", OTHER)}
 BY = {"who": "JL", "why": "an injury"}
 # by a program, in order
-PAIRS = {"run": (("R1", "test"), ("R2", "test"), ("R1", "retest"))}
-PAIRS |= {"drawn": (), "of another scheme": PAIRS["run"][:1]}
+PAIRS: dict[str, tuple[tuple[str, str], ...]] = {
+    "run": (("R1", "test"), ("R2", "test"), ("R1", "retest")),
+    "of another scheme": (("R1", "test"),),
+    "drawn": (),
+}
 
 
 @dataclass(frozen=True)
@@ -63,12 +55,12 @@ class Case:
 def by_a_person(study: Study) -> None:
     rater = "R2" if study[0].log_file("R1", "test").exists() else "R1"
     grades = console("\n1\n" * 5)[0]
-    run_session(*study, rater, "test", grades=grades, clock="simulated")
+    run.run_session(*study, rater, "test", grades=grades, clock="simulated")
 
 
 def on_paper(study: Study) -> None:
-    file = typed(study, filled(study, "1", "2", "3"))
-    enter_sheet(*study, file, "R1", "test", who="JL")
+    rows = filled(study, "1", "2", "3")
+    paper.enter_sheet(*study, typed(study, rows), "R1", "test", who="JL")
 
 
 def amend(study: Study) -> None:
@@ -80,7 +72,7 @@ def amend(study: Study) -> None:
         text = paths.protocol.read_text(encoding="utf-8").replace(old, new)
         paths.protocol.write_text(text, encoding="utf-8")
         if new == "gwet_ac":
-            record_amendment(paths, read_protocol(paths.protocol), **BY)
+            conduct.record_amendment(paths, read_protocol(paths.protocol), **BY)
 
 
 def elsewhere(study: Study) -> Path:
@@ -124,7 +116,7 @@ CASES = {
     ),
     "an unblinding": Case(
         ("Codes were unblinded once.",), never=("No unblinding",),
-        then=lambda study: record_unblinding(*study, None, **BY),
+        then=lambda study: conduct.record_unblinding(*study, None, **BY),
     ),
     "a person instead of a program": Case(
         ("SIMULATED DEVICE: persons gave these grades, 3 of 3 on the simulated device",
@@ -170,7 +162,7 @@ CASES = {
     "a withdrawn rater": Case(
         ("R1 withdrew; grades given until then count.",),
         never=("INTERIM",), n_run=2,
-        then=lambda study: record_standing(*study, "R1", "withdrawn", **BY),
+        then=lambda study: conduct.record_standing(*study, "R1", "withdrawn", **BY),
     ),
     "practice and breaks": Case(
         ("1 session began with practice on HM1, which was not rated; 1 break was taken",
@@ -180,10 +172,13 @@ CASES = {
 }  # fmt: skip
 
 
-def shown(material: Material) -> str:
+def shown(material: _material.Material) -> str:
     """Headline, methods, and tables and captions with their tags and stamps."""
-    texts = [material.banner, material.provenance, result_text(material)]
-    made = [made_section(name, material) for name in ("methods", "grades", "conduct")]
+    texts = [material.banner, material.provenance, _paragraphs.result_text(material)]
+    made = [
+        _document.made_section(name, material)
+        for name in ("methods", "grades", "conduct")
+    ]
     return "\n".join((*texts, tag_of(material.data), *map(str, made)))
 
 
@@ -194,16 +189,13 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, pairs in PAIRS.items():
         paths = StudyPaths(folder / name)
         paths.root.mkdir()
-        more = (
-            PLAN.replace("[schedule]", OTHER) if name == "of another scheme" else PLAN
-        )
-        text = PROTOCOL.replace("[schedule]", more)
+        text = PROTOCOL.replace("[schedule]", MORE.get(name, PLAN))
         paths.protocol.write_text(text, encoding="utf-8")
         protocol = read_protocol(paths.protocol)
-        allot_schedules(paths, protocol)
+        conduct.allot_schedules(paths, protocol)
         for pair in pairs:
-            grades = SimulatedGrades(protocol)
-            run_session(paths, protocol, *pair, grades=grades, clock="simulated")
+            grades = run.SimulatedGrades(protocol)
+            run.run_session(paths, protocol, *pair, grades=grades, clock="simulated")
     return folder
 
 
@@ -218,10 +210,10 @@ def test_words_follow_the_record(what: str, studies: Path, tmp_path: Path) -> No
     came = case.then((paths, read_protocol(paths.protocol)))
     file = came if isinstance(came, Path) else None
     protocol = read_protocol(paths.protocol)
-    data = read_study_data(paths, protocol, file=file)
-    conduct = study_conduct(paths, protocol, file=file, include=case.include)
-    analysis = analyze(protocol, data.ratings)
-    text = shown(gather(protocol, data.ratings, analysis, conduct=conduct))
+    data = ratings.read_study_data(paths, protocol, file=file)
+    happened = report.study_conduct(paths, protocol, file=file, include=case.include)
+    of_study = (protocol, data.ratings, analysis.analyze(protocol, data.ratings))
+    text = shown(_material.gather(*of_study, conduct=happened))
     for said in case.says:
         assert said in text
     for unsaid in case.never:
