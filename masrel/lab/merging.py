@@ -233,6 +233,7 @@ def _files(
             if owners.get(rater, study) != study
             for file in (
                 study.schedule_file(rater, session),
+                study.opened_file(rater, session),
                 study.sheet_file(rater, session),
                 study.typed_file(rater, session),
             )

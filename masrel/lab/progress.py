@@ -32,6 +32,7 @@ __all__ = [
     "RaterProgress",
     "SessionProgress",
     "next_step",
+    "open_sessions",
     "rater_progress",
     "raters_csv",
     "session_progress",
@@ -431,8 +432,7 @@ def next_step(
         what is made of complete sessions.
     """
     root = shlex.quote(str(study.root))
-    absent = {r.rater for r in raters if r.status in ("withdrawn", "excluded")}
-    open_ = [s for s in sessions if s.stage != "complete" and s.rater not in absent]
+    open_ = open_sessions(sessions, raters)
     ready = [session for session in open_ if session.refused is None]
     by_stage = {session.stage: session for session in reversed(ready)}
     if "unreadable" in by_stage:
@@ -446,7 +446,34 @@ def next_step(
     for stage in ("begun", "drawn"):
         if stage in by_stage:
             return _to_run(root, by_stage[stage], sessions)
+    places = [(session.rater, session.session) for session in sessions]
+    drawn = _read_drawn(study, places, skips_damaged=True)
+    if not open_ and any(schedule.is_closed for _, schedule in drawn):
+        command = f"masrel record unblind {root} --all --who WHO --why WHY"
+        why = "all sessions are complete, and which models were met is sealed"
+        return NextStep(command=command, why=why, verb="unblind")
     return _to_await(root, open_) or _to_make(study, root)
+
+
+def open_sessions(
+    sessions: Sequence[SessionProgress], raters: Sequence[RaterProgress]
+) -> list[SessionProgress]:
+    """Return the sessions that are neither complete nor of a rater who has left.
+
+    Parameters
+    ----------
+    sessions : sequence of SessionProgress
+        What `session_progress` returned.
+    raters : sequence of RaterProgress
+        What `rater_progress` returned.
+
+    Returns
+    -------
+    list of SessionProgress
+        In their order; those of raters who are withdrawn or excluded are not there.
+    """
+    absent = {r.rater for r in raters if r.status in ("withdrawn", "excluded")}
+    return [s for s in sessions if s.stage != "complete" and s.rater not in absent]
 
 
 def _of_study(verb: str, root: str, why: str) -> NextStep:

@@ -42,6 +42,8 @@ from masrel.lab.ratings import (
     retest_pairs,
 )
 
+_SEALED_STILL = "which models were met is sealed"
+
 
 def analyze(
     protocol: Protocol,
@@ -73,7 +75,8 @@ def analyze(
     -------
     Analysis
         One entry per line of the plan; a line whose data are absent has a reason
-        instead of an estimate. Parts no section asks for are None.
+        instead of an estimate, of sealed ratings each. Parts no section asks for are
+        None.
 
     Raises
     ------
@@ -91,15 +94,17 @@ def analyze(
     SmallSampleWarning
         If an interval rests on too little data.
     """
-    _check_known(protocol, ratings)
     inputs = _inputs(protocol, ratings, in_person, answers)
+    is_sealed, sections = ratings.is_sealed, set(report_sections(protocol))
+    if is_sealed:  # nothing of them could be said without a model
+        ratings, answers, sections = replace(ratings, rows=()), (), set()
+    _check_known(protocol, ratings)
     if excluded:
         ratings = ratings.without(excluded)
         if in_person is not None:
             rows = tuple(row for row in in_person.rows if row.rater not in excluded)
             in_person = replace(in_person, rows=rows)
         answers = [each for each in answers if each.rater not in excluded]
-    sections = set(report_sections(protocol))
     # descriptions of grades speak of the first session that has ratings
     present = {row.session for row in ratings.rows}
     session = next((s.id for s in protocol.sessions if s.id in present), None)
@@ -107,7 +112,10 @@ def analyze(
         study=protocol.study.id,
         level=protocol.analysis.level,
         estimates=tuple(
-            _estimate(line, protocol, ratings) for line in protocol.analysis.estimates
+            PlannedEstimate(line=line, reason=_SEALED_STILL)
+            if is_sealed
+            else _estimate(line, protocol, ratings)
+            for line in protocol.analysis.estimates
         ),
         intended=(
             intended_agreement(protocol, ratings, session)

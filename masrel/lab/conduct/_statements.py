@@ -443,7 +443,7 @@ def record_unblinding(
     protocol : Protocol
         The study's protocol.
     code : str or None
-        A code of a schedule; None for all of them.
+        A code of a schedule; None for all of them, of a study that is not sealed.
     who, why : str
         Who is to know, and for what reason.
     rater, session : str, optional
@@ -461,7 +461,8 @@ def record_unblinding(
     ParameterError
         If `who` or `why` is blank.
     ScheduleError
-        If no drawn schedule has the code, several have it, or one is damaged.
+        If no drawn schedule has the code, several have it, or one is damaged, or
+        sealed where all are asked for.
     SessionLogError
         If the log of the study's conduct is damaged.
     OSError
@@ -473,9 +474,15 @@ def record_unblinding(
         for pair in protocol.rater_sessions
         if rater in (None, pair[0]) and session in (None, pair[1])
     ]
+    drawn = [schedule for _, schedule in _read_drawn(study, meant)]
+    if code is None and any(schedule.is_closed for schedule in drawn):
+        raise ScheduleError(
+            f"code: needed one of {study.schedules}, which is sealed, got none: --all "
+            "alone opens it, once every session is over"
+        )
     revealed = tuple(
         (schedule, shown)
-        for _, schedule in _read_drawn(study, meant)
+        for schedule in drawn
         for shown in _open_schedule(study, protocol, schedule).presentations
         if code in (None, shown.code)
     )

@@ -33,7 +33,6 @@ from masrel.lab.ratings.table import (
 )
 from masrel.lab.run._state import FROM_PAPER, FROM_PERSONS, SessionState, read_session
 from masrel.lab.schedule import Schedule, check_schedule, read_schedule
-from masrel.lab.schedule.presentation import _SEALED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,16 +106,15 @@ def read_study_data(
         ratings = ratings_from_logs(study, protocol)
         _refuse_other_table(study.ratings_file, ratings)
         read = f"{len(ratings.rows)} ratings from the logs in {study.sessions}"
-        if not allows_sealed and any(row.model == _SEALED for row in ratings.rows):
-            raise RatingsError(
-                f"{study.schedules}: who met which model is sealed until every session "
-                "is over: masrel status says how far it is, and then masrel record "
-                "unblind --all opens it"
-            )
     else:
         source = file or _file_of(study)
         ratings = read_study_ratings(source, scale_of(protocol))
         read = f"{len(ratings.rows)} ratings from {source}"
+    if ratings.is_sealed and not allows_sealed:
+        raise RatingsError(
+            f"{study.schedules}: which models were met is sealed: masrel record "
+            "unblind --all opens it, once every session is over"
+        )
     return StudyData(
         paths=study,
         protocol=protocol,

@@ -327,6 +327,8 @@ def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
         Column(key="first_grade", heading="First", align="center"),
         Column(key="grade", heading="Corrected", align="center"),
     ]
+    if material.ratings.is_sealed:
+        columns = [each for each in columns if each.key not in ("model", "repeat")]
     if _NOTES in conduct.include:
         columns.append(Column(key="why", heading="Reason", align="left"))
     if _WHO in conduct.include:

@@ -28,7 +28,7 @@ from masrel.lab.report._grade_sections import (
     intended_section,
     questionnaires_section,
 )
-from masrel.lab.report._material import Material, gather, lacking
+from masrel.lab.report._material import Material, gather, lacking, sentence
 from masrel.lab.report._order_tables import order_section
 from masrel.lab.report._pages import CONVERTED, WRITERS, pandoc_version
 from masrel.lab.report._paragraphs import methods_section, result_text
@@ -216,7 +216,9 @@ def make_report(
     # formats: those that are made beside the protocol's
     # By name from the report's folder, in the order in which they are to be written
     protocol, analysis = material.protocol, material.analysis
-    names = [n for n in section_names(protocol) if not only or n in only]
+    is_sealed = material.ratings.is_sealed
+    every = section_names(protocol, is_sealed=is_sealed)
+    names = [name for name in every if not only or name in only]
     sections = [made_section(name, material) for name in names]
     assets, inputs = dict[str, bytes](), dict(analysis.inputs)
     document = Document(
@@ -224,7 +226,7 @@ def make_report(
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
-        result=result_text(analysis),
+        result=sentence("result", "sealed") if is_sealed else result_text(analysis),
         sections=_chapters(
             [section for section in sections if section.blocks],
             partial(_block, assets, progress, raw_csv),
@@ -236,20 +238,22 @@ def make_report(
         ),
         version=analysis.masrel_version,
     )
-    every = {*protocol.report.formats, *formats}
-    writers = [writer for name, writer in WRITERS.items() if name in every]
+    forms = {*protocol.report.formats, *formats}
+    writers = [writer for name, writer in WRITERS.items() if name in forms]
     pages = {file: write(document) for file, write in writers}
     pages[NUMBERS] = analysis_text(analysis).encode()
     if progress is not None:
         progress("pages")
     if material.conduct is not None:
         inputs |= material.conduct.inputs
-    pandoc = pandoc_version() if CONVERTED & every else None
+    pandoc = pandoc_version() if CONVERTED & forms else None
     return report_files(assets, pages, inputs, pandoc=pandoc)
 
 
-def section_names(protocol: Protocol) -> list[str]:
+def section_names(protocol: Protocol, *, is_sealed: bool) -> list[str]:
     """Return the names of the sections that a report can have, in their order."""
+    if is_sealed:
+        return ["flow", "conduct"]
     names = list(report_sections(protocol))
     place = names.index("design") + 1 if "design" in names else 0
     # no protocol names them: they are there where there is anything to say

@@ -455,6 +455,7 @@ class _Runner(Presenter):
             ),
             attempt=1,
             practice=is_practice,
+            sealed=self._schedule.sealed and not is_practice,
             rehearsal=self._is_rehearsal,
             rules=self._protocol.presentation,
             may_skip=True,

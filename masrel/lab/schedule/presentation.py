@@ -369,13 +369,13 @@ def read_schedule(path: Path) -> Schedule:
 
 def _closed(schedule: Schedule) -> Schedule:
     """Return a schedule without its models."""
-    return replace(
-        schedule,
-        presentations=tuple(
-            replace(shown, model=_SEALED, repeat=shown.position)
-            for shown in schedule.presentations
-        ),
-    )
+    hidden = tuple(map(_hidden, schedule.presentations))
+    return replace(schedule, presentations=hidden)
+
+
+def _hidden(shown: Presentation) -> Presentation:
+    """Return a presentation without its model."""
+    return replace(shown, model=_SEALED, repeat=shown.position)
 
 
 def _head_entry(line: str) -> tuple[str, str]:

@@ -197,14 +197,19 @@ def _drawn_texts(
     drawn_from = _content_file(study, presented_hash(protocol))
     if not drawn_from.exists():
         texts[drawn_from] = presented_content(protocol)
+    # whatever the protocol says now, what was sealed at the first draw stays so
+    there = _read_drawn(study, protocol.rater_sessions, skips_damaged=True)
+    is_sealed = protocol.blinding.sealed or any(each.sealed for _, each in there)
     rows = {} if allot is None else allot(to_draw)
     key = key or new_secret(study)
     for place in to_draw:
         drawn = draw_schedule(protocol, *place, secret=key, row=rows.get(place))
+        if is_sealed:
+            drawn = _closed(replace(drawn, sealed=True))
         # The sheet gets its name first: one without its schedule is drawn anew.
         texts[study.sheet_file(*place)] = _sheet_text(drawn)
-        text = _schedule_text(_closed(drawn) if drawn.sealed else drawn)
-        texts[study.schedule_file(*place)] = text
+        texts[study.schedule_file(*place)] = _schedule_text(drawn)
+        study.opened_file(*place).unlink(missing_ok=True)  # of what was drawn before
     return texts
 
 

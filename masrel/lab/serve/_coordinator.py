@@ -37,6 +37,7 @@ from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.run import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
+from masrel.lab.sealing import is_sealed
 from masrel.lab.serve._access import Access, qr_svg
 from masrel.lab.serve._live import SampleTail
 from masrel.lab.serve._manager import SessionManager
@@ -213,7 +214,7 @@ class CoordinatorPages(Pages):
 
     def _live(self, tail: SampleTail | None) -> tuple[str, Any]:
         return "live", {"begins": True} if tail is None else _frame(
-            tail, is_sealed=bool(self._overview.get("sealed"))
+            tail, is_sealed=self._overview.get("sealed", True)
         )
 
     async def act(self, request: Request) -> Response:
@@ -433,7 +434,7 @@ def overview(study: StudyPaths) -> dict[str, Any]:
             for questionnaire in protocol.questionnaires
             for question in questionnaire.questions
         ],
-        "sealed": protocol.blinding.sealed,
+        "sealed": is_sealed(study, protocol),
         "device": {name: getattr(protocol.device, name) for name in _DEVICE},
         "n_torque_problems": len(tuple(torque_problems(protocol))),
         "has_report": (study.root / "report" / "report.html").is_file(),

@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -27,7 +27,7 @@ from masrel.lab._study_files import (
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import _FORMAT as _RECORDING_FORMAT
 from masrel.lab.schedule import Presentation
-from masrel.lab.schedule.presentation import _SEALED
+from masrel.lab.schedule.presentation import _SEALED, _hidden
 
 _Checked = TypeVar("_Checked")
 
@@ -180,7 +180,7 @@ def recording_findings(
         yield broken(path, problem)
     as_shown = shown[code]
     if facts.get("model") == _SEALED:  # as it was recorded
-        as_shown = replace(as_shown, model=_SEALED, repeat=as_shown.position)
+        as_shown = _hidden(as_shown)
     needed: dict[str, object] = {
         **of,
         "sha256": event.fields["sha256"],

@@ -1,5 +1,6 @@
 """The record of a study, from protocol to report, each file held against the last."""
 
+import csv
 import hashlib
 import os
 import warnings
@@ -31,6 +32,7 @@ from masrel.lab.conduct._study_log import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import schedule_problems
+from masrel.lab.schedule.presentation import _SEALED
 from masrel.lab.verification._log_findings import (
     Finding,
     broken,
@@ -254,7 +256,6 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
         ratings_from_logs,
         read_study_data,
     )
-    from masrel.lab.sealing import as_far_as_known
 
     try:
         if study.logs():
@@ -270,7 +271,8 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
         # of statistics
         with warnings.catch_warnings(action="ignore", category=MasrelWarning):
             analysis = analyze(
-                *as_far_as_known(protocol, ratings),
+                protocol,
+                ratings,
                 in_person=in_person_of(study, ratings),
                 answers=answers_of(study, protocol),
                 excluded=excluded_raters(study),
@@ -305,12 +307,29 @@ def _table_findings(
         if not path.is_file():
             continue
         differences = list(_table_differences(path, texts(), newest=newest))
+        if differences and any(_is_from_before(path, text) for text in texts()):
+            message = "was made before the study was unblinded"
+            yield stale(path, f"{message}; masrel ratings writes it anew")
+            continue
         for difference in differences[:_SHOWN]:
             yield broken(path, f"{difference}; masrel ratings writes it anew")
         if len(differences) > _SHOWN:
             yield broken(
                 path, f"there are {len(differences) - _SHOWN} more differences"
             )
+
+
+def _is_from_before(path: Path, text: str) -> bool:
+    # whether a table differs from it in nothing but models that were sealed still
+    old = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
+    made, known = (
+        [*csv.DictReader(line for line in table.splitlines() if line[:1] != "#")]
+        for table in (old, text)
+    )
+    for row, now in zip(made, known, strict=False):
+        if row.get("model") == _SEALED:
+            now |= {key: row[key] for key in ("model", "repeat")}
+    return made == known
 
 
 def _of_same_table(
