@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from masrel._files import make_folder, write_files
+from masrel._files import write_files
 from masrel._input import refuse
 from masrel.errors import ParameterError, ProtocolError, ScheduleError
 from masrel.lab._event_log import line_hashes
@@ -83,14 +83,11 @@ def merge_studies(studies: Sequence[StudyPaths], destination: Path) -> StudyPath
     files = _files(studies, protocols, owners, names)
     with new_folder(destination) as part:
         merged = StudyPaths(part)
-        # For their owner alone from the start, however open the sources are: schedules
-        # and recordings name the models, and logs say who did what and why.
-        folders = {part / parent for name in files for parent in Path(name).parents}
-        for folder in sorted(folders):
-            make_folder(folder, mode=0o700)
-        for name, file in files.items():
-            write_files({part / name: _content(file)}, within=part, mode=0o600)
+        # First: in a study what is private is its owner's alone, however open the
+        # sources are.
         write_files({merged.protocol: _merged_protocol(studies)}, mode=0o600)
+        for name, file in files.items():
+            write_files({part / name: _content(file)}, within=part)
         protocol = read_protocol(merged.protocol)
         for fields in _merged_logs(studies, protocols, names, part):
             append_event(merged, protocol, "merged", fields)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from masrel._files import write_file
+from masrel._files import usual_mode, write_file
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, as_document
 from masrel.lab.protocol import EstimatePlan
@@ -405,7 +405,11 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
 
 
 def write_analysis(
-    analysis: Analysis, path: Path, *, within: Path | None = None
+    analysis: Analysis,
+    path: Path,
+    *,
+    within: Path | None = None,
+    is_private: bool = False,
 ) -> None:
     """Write an analysis as JSON; the same analysis gives the same bytes.
 
@@ -417,6 +421,8 @@ def write_analysis(
         The file.
     within : Path, optional
         A folder that the file may not leave by a link, such as the study's.
+    is_private : bool, optional
+        Whether it is its owner's alone, as of a study that goes on.
 
     Raises
     ------
@@ -425,7 +431,8 @@ def write_analysis(
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    write_file(path, analysis_text(analysis), within=within)
+    mode = 0o600 if is_private else usual_mode(0o666)
+    write_file(path, analysis_text(analysis), within=within, mode=mode)
 
 
 def analysis_text(analysis: Analysis) -> str:

@@ -58,11 +58,22 @@ def analyze(
         return
     destination = output.json_file or data.paths.analysis_file
     library.write_analysis(
-        analysis, destination, within=None if output.json_file else study
+        analysis,
+        destination,
+        within=None if output.json_file else study,
+        is_private=_goes_on(data),
     )
     _show(data, analysis, csv=bool(output.csv), raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
     conclude(verdict_of(analysis, gates), gating)
+
+
+def _goes_on(data: "StudyData") -> bool:
+    from masrel.lab.progress import open_sessions, rater_progress, session_progress
+
+    study, protocol = data.paths, data.protocol
+    sessions = session_progress(study, protocol) if study.logs() else ()
+    return bool(open_sessions(sessions, rater_progress(study, protocol, sessions)))
 
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:

@@ -48,6 +48,7 @@ def _show(
         text=lambda: summary_table(balances),
         figure=lambda: Drawn(FIGURES + "_study_figures:order_pictures", (balances,)),
         stamp="not for raters",
+        mode=0o600,
         more=[table for balance in balances for table in count_tables(balance)],
     )
 

@@ -76,6 +76,7 @@ def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> 
                 f"next: {step.command}  ({step.why})",
             ]
         ),
+        mode=0o600,
     )
 
 
@@ -191,6 +192,7 @@ def _raters(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) ->
         output,
         document=lambda: {"raters": rows},
         text=lambda: _raters_table(rows, protocol, simulated=simulated),
+        mode=0o600,
     )
 
 

@@ -13,6 +13,7 @@ from masrel.lab.conduct._study_log import conduct_hash
 from masrel.lab.progress import (
     RaterProgress,
     SessionProgress,
+    open_sessions,
     rater_progress,
     session_progress,
 )
@@ -59,6 +60,11 @@ class StudyConduct:
     remarks: tuple[str, ...]
     sha256: str | None
     include: frozenset[str]
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether a session is still to come of a rater who takes part."""
+        return bool(open_sessions(self.sessions, self.raters))
 
     @property
     def inputs(self) -> dict[str, str]:

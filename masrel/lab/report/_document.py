@@ -247,7 +247,8 @@ def make_report(
     if material.conduct is not None:
         inputs |= material.conduct.inputs
     pandoc = pandoc_version() if CONVERTED & forms else None
-    return report_files(assets, pages, inputs, pandoc=pandoc)
+    is_private = material.conduct is not None and material.conduct.goes_on
+    return report_files(assets, pages, inputs, pandoc=pandoc, is_private=is_private)
 
 
 def section_names(protocol: Protocol, *, is_sealed: bool) -> list[str]:

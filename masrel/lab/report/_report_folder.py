@@ -25,6 +25,7 @@ from masrel._files import (
     make_folder,
     refuse_record,
     sync_folder,
+    usual_mode,
     write_file,
     write_files,
 )
@@ -54,9 +55,10 @@ def report_files(
     inputs: Mapping[str, str],
     *,
     pandoc: str | None = None,
+    is_private: bool = False,
 ) -> dict[str, bytes]:
     """Return every file of a report in the order in which they are written."""
-    # pandoc: its version, where it made a page
+    # pandoc: its version, where it made a page; is_private: of a study that goes on
     # Imported here: whether a report is current is known without it.
     from masrel.lab.verification.record import _REPORT_FORMAT
 
@@ -66,6 +68,7 @@ def report_files(
         "inputs": dict(inputs),
         "files": {place: _hash(data) for place, data in written.items()},
         **({} if pandoc is None else {"pandoc": pandoc}),
+        **({"private": True} if is_private else {}),
     }
     manifest = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     return {**written, MANIFEST: manifest.encode()}
@@ -76,24 +79,40 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
     for name in files:
         if "/" not in name:
             refuse_record(folder / name)
-    with _alone(folder):
+    is_private = "private" in json.loads(files[MANIFEST])
+    with _alone(folder, 0o700 if is_private else None):
+        was_private = "private" in _manifest(folder)
         changed, stale = report_changes(folder, files)
         new = {folder / place: files[place] for place in changed}
         assets = {path: data for path, data in new.items() if path.parent != folder}
-        write_files(assets, within=folder)
+        mode = 0o600 if is_private else None
+        write_files(assets, within=folder, mode=mode)
         for path, data in new.items():  # the pages, and the manifest last
             if path not in assets:
-                write_files({path: data}, within=folder)
+                write_files({path: data}, within=folder, mode=mode)
+        if is_private or was_private:
+            _set_modes(folder, files, is_private=is_private)
         for path in stale:
             path.unlink()
         for parent in dict.fromkeys(path.parent for path in stale):
             sync_folder(parent)
 
 
+def _set_modes(folder: Path, files: Iterable[str], *, is_private: bool) -> None:
+    # also of what has not changed
+    paths = [folder / place for place in files]
+    folders = {path.parent for path in paths} - {folder}
+    if (folder.parent / "protocol.toml").is_file():  # any other may be somebody's
+        folders.add(folder)
+    for path in (*paths, *folders):
+        mode = 0o777 if path in folders else 0o666
+        path.chmod(mode & 0o700 if is_private else usual_mode(mode))
+
+
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _alone(folder: Path, mode: int | None) -> Iterator[None]:
     # Of two builds at once one waits: else it would remove what the other links to.
-    make_folder(folder)
+    make_folder(folder, mode=mode)
     if sys.platform == "win32":
         yield
         return
@@ -122,13 +141,18 @@ def _differs(path: Path, digest: str) -> bool:
     return path.is_symlink() or file_hash(str(path)) != digest
 
 
-def _hashes_in(folder: Path) -> dict[str, str]:
-    # what its manifest says of the files of a report; nothing if there is none
+def _manifest(folder: Path) -> dict[str, Any]:
+    # that of the report in a folder; empty if there is none
     try:
         document = json.loads(read_regular(folder / MANIFEST, most=MAX_TABLE))
     except (OSError, ValueError):
         return {}
-    files = document.get("files") if isinstance(document, dict) else None
+    return document if isinstance(document, dict) else {}
+
+
+def _hashes_in(folder: Path) -> dict[str, str]:
+    # what its manifest says of the files of a report
+    files = _manifest(folder).get("files")
     pairs = files.items() if isinstance(files, dict) else ()
     return {name: digest for name, digest in pairs if isinstance(digest, str)}
 
