@@ -5,6 +5,7 @@ raters alone. Out: a new folder with all raters, schedules, logs and recordings,
 verified before and after.
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -19,14 +20,13 @@ from masrel.lab._event_log import line_hashes
 from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
-    leaves,
     new_folder,
     parse_toml,
     read_regular,
     toml_lines,
 )
 from masrel.lab.conduct._study_log import append_event
-from masrel.lab.paper._printing import has_answers
+from masrel.lab.paper._form import has_answers
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
@@ -34,6 +34,7 @@ from masrel.lab.protocol import (
     protocol_hash,
     read_protocol,
 )
+from masrel.lab.protocol.content import _content_differences
 from masrel.lab.schedule import read_schedule
 from masrel.lab.schedule._secret import find_secret
 from masrel.lab.verification import verify_study
@@ -128,16 +129,13 @@ def _check_protocols(
     # refuses protocols that differ in more than which raters take part
     for study, protocol in zip(studies[1:], protocols[1:], strict=True):
         raters = {r.id for r in protocols[0].raters} & {r.id for r in protocol.raters}
-        first, other = (
-            dict(leaves(_comparable(each, raters))) for each in (protocols[0], protocol)
-        )
-        for key in sorted({**first, **other}):
-            values = first.get(key, "none"), other.get(key, "none")
-            if values[0] != values[1]:
-                raise ProtocolError(
-                    f"{key}: needed the same in all protocols, got {values[0]} in "
-                    f"{studies[0].protocol} and {values[1]} in {study.protocol}"
-                )
+        one, another = (_comparable(each, raters) for each in (protocols[0], protocol))
+        for key, *values in _content_differences(one, another):
+            first, other = (json.dumps(each, ensure_ascii=False) for each in values)
+            raise ProtocolError(
+                f"{key}: needed the same in all protocols, got {first} in "
+                f"{studies[0].protocol} and {other} in {study.protocol}"
+            )
         if presented_hash(protocol) != presented_hash(protocols[0]):
             raise ProtocolError(
                 f"{study.protocol}: needed what {studies[0].protocol} presents, got "
@@ -146,15 +144,11 @@ def _check_protocols(
 
 
 def _comparable(protocol: Protocol, raters: set[str]) -> dict[str, Any]:
-    # content by the ids of its entries, with these raters, without who takes part when
+    # content with these raters, without who takes part when
     content: dict[str, Any] = msgspec.to_builtins(protocol)
     for session in content["sessions"]:
         del session["raters"]
-    content["raters"] = [r for r in content["raters"] if r["id"] in raters]
-    for array in ("models", "sessions"):
-        content[f"{array} in order"] = [entry["id"] for entry in content[array]]
-    for array in ("models", "raters", "sessions"):
-        content[array] = {entry["id"]: entry for entry in content[array]}
+    content["raters"] = {r["id"]: r for r in content["raters"] if r["id"] in raters}
     return content
 
 

@@ -418,8 +418,7 @@ def refuse_withdrawn(study: StudyPaths, rater: str) -> None:
         if event.kind == "withdrawn" and event.fields["rater"] == rater:
             raise ParameterError(
                 f"rater: needed one who takes part, {rater} was withdrawn on "
-                f"{event.time_utc[:10]} by {event.fields['who']}: "
-                f"{event.fields['why']}"
+                f"{event.fields.get('on') or event.time_utc[:10]}"
             )
 
 

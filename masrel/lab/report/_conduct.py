@@ -171,7 +171,13 @@ def _flow(
         "planned": [r.rater for r in raters],
         "begun": [r.rater for r in raters if stages[r.rater] & {"begun", "complete"}],
         "complete": [r.rater for r in raters if stages[r.rater] == {"complete"}],
-        "withdrawn": [r.rater for r in raters if r.status == "withdrawn"],
+        # who left after a session was complete, not in that one
+        "withdrawn": [
+            r.rater
+            for r in raters
+            if r.status == "withdrawn"
+            and (session is None or stages[r.rater] != {"complete"})
+        ],
         "excluded": [r.rater for r in raters if r.status == "excluded"],
         "late": [r.rater for r in raters if r.is_late],
         "analysed": [*graded - set(material.analysis.excluded)],

@@ -31,7 +31,7 @@ from masrel.lab.protocol._values import questions_of
 from masrel.lab.protocol.content import _refuse_unknown_coefficients
 from masrel.lab.run._corrections import correct_in_session
 from masrel.lab.run._days import (
-    completed_at,
+    completed_on,
     days_since,
     interval_fields,
     last_time,
@@ -426,7 +426,7 @@ class _Runner(Presenter):
         sessions = [each.id for each in protocol.sessions if rater in each.raters]
         if not questions_of(protocol, "study"):
             return
-        if all(completed_at(study, rater, each) for each in sessions):
+        if all(completed_on(study, rater, each) for each in sessions):
             ask_questions(
                 protocol,
                 "study",

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import dataclasses
 import json
 import math
 import os
@@ -26,13 +25,12 @@ from masrel.lab._study_files import read_once
 from masrel.lab.conduct import (
     Note,
     allot_schedules,
-    read_conduct,
     record_note,
     record_standing,
     record_unblinding,
 )
 from masrel.lab.conduct._study_log import check_choice, check_rater
-from masrel.lab.progress import next_step, rater_progress, session_progress
+from masrel.lab.progress import study_status
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.run import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
@@ -406,28 +404,11 @@ def overview(study: StudyPaths) -> dict[str, Any]:
     By the logs; no model is named.
     """
     protocol = read_protocol(study.protocol)
-    sessions = session_progress(study, protocol)
-    raters: list[dict[str, Any]] = []
-    events: list[dict[str, Any]] = []
-    problem, step = None, None
-    try:
-        progress = rater_progress(study, protocol, sessions)
-        raters = [{"rater": each.rater, "status": each.status} for each in progress]
-        step = dataclasses.asdict(next_step(study, sessions, progress))
-        events = [
-            {"event": event.kind, "time_utc": event.time_utc, **event.fields}
-            for event in read_conduct(study)[-_N_EVENTS:]
-        ]
-    except MasrelError as error:  # hides no session
-        problem = str(error)
+    stands = study_status(study, protocol)
     return {
-        "study": protocol.study.id,
+        **stands,
+        "events": stands["events"][-_N_EVENTS:],
         "title": protocol.study.title,
-        "sessions": [dataclasses.asdict(session) for session in sessions],
-        "raters": raters,
-        "events": events,
-        "problem": problem,
-        "next": step,
         "grades": list(protocol.scale.grades),
         "questions": [
             f"{questionnaire.id}.{question.id}"

@@ -333,7 +333,8 @@ def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Fi
     ------
     Finding
         A log that is gone, is shorter than it was, or has another line there. Logs
-        that have grown since are fine.
+        that have grown since are fine, and so is that of a study's conduct in a study
+        that it was merged into.
 
     Raises
     ------
@@ -344,6 +345,14 @@ def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Fi
     hashes: dict[str, tuple[str, ...]] = {}
     for anchor in anchors:
         path = study.root / anchor.log
+        if (
+            path == study.conduct_file
+            and any(  # that of a site is elsewhere now
+                anchor.sha256 in line_hashes(log)[anchor.line - 1 :][:1]
+                for log in study.conduct_logs()
+            )
+        ):
+            continue
         if anchor.log not in logs:
             yield broken(path, "needed the log that an anchor names, got no file")
             continue

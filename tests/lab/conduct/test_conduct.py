@@ -90,7 +90,7 @@ def test_a_withdrawn_rater_goes_on_with_no_session_but_is_corrected(
     before = study.log_file("R1", "test").read_bytes()
     record_standing(study, protocol, "R1", "withdrawn", **BY)
     assert study.log_file("R1", "test").read_bytes() == before
-    with pytest.raises(ParameterError, match=r"R1 was withdrawn on \d{4}-.* by MK"):
+    with pytest.raises(ParameterError, match=r"R1 was withdrawn on [-\d]+$"):
         run(small, "R1")
     with pytest.raises(ParameterError, match="R1 was withdrawn"):
         record_standing(study, protocol, "R1", "withdrawn", **BY)
