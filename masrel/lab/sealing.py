@@ -10,7 +10,12 @@ from masrel._files import write_files
 from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._event_log import utc_now
-from masrel.lab.conduct._study_log import append_event, events_of_logs, stated
+from masrel.lab.conduct._study_log import (
+    append_event,
+    events_of_logs,
+    recover_conduct,
+    stated,
+)
 from masrel.lab.progress import open_sessions, rater_progress, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.schedule.presentation import _read_drawn, _schedule_text
@@ -84,6 +89,7 @@ def unseal_study(
     drawn = [each for _, each in _read_drawn(study, protocol.rater_sessions)]
     if not (sealed := [each for each in drawn if each.sealed]):
         return 0
+    recover_conduct(study)
     sessions = session_progress(study, protocol)
     going_on = open_sessions(sessions, rater_progress(study, protocol, sessions))
     if going_on:

@@ -20,6 +20,7 @@ from masrel.lab.conduct._study_log import (
     events_of_logs,
     last_version,
     open_conduct,
+    recover_conduct,
     stated,
     version_of,
 )
@@ -210,6 +211,7 @@ def record_amendment(
         If it cannot be written.
     """
     reasons = stated(who=who, why=why)
+    recover_conduct(study)
     before = last_version(event for _, event in events_of_logs(study))
     if before is None:
         raise ParameterError(

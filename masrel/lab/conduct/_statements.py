@@ -17,6 +17,7 @@ from masrel.lab.conduct._study_log import (
     open_conduct,
     past_day,
     read_conduct,
+    recover_conduct,
     stated,
 )
 from masrel.lab.protocol import Protocol, RaterField, StudyPaths
@@ -369,6 +370,7 @@ def record_standing(
     """
     check_rater(protocol, rater)
     check_choice("standing", standing, get_args(Standing))
+    recover_conduct(study)
     is_excluded = rater in excluded_raters(study)
     if standing == "withdrawn":
         refuse_withdrawn(study, rater)

@@ -21,6 +21,7 @@ from masrel.lab._event_log import (
     Event,
     SessionLog,
     check_kinds,
+    events_before_torn,
     line_hashes,
     read_log,
     utc_now,
@@ -173,6 +174,13 @@ def append_event(
     """Append an event to the log of a study; the first one comes after a head."""
     with open_conduct(study, protocol, now=now) as log:
         log.append(kind, fields)
+
+
+def recover_conduct(study: StudyPaths) -> None:
+    """Set aside what was written of a line, so that what reads the log can go on."""
+    log = study.conduct_file
+    if log.exists() and events_before_torn(log) is not None:
+        SessionLog.open(log, wait_s=_WAIT_S).close()
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from masrel.lab._study_files import Fact
 from masrel.lab.conduct._study_log import (
     append_event,
     past_day,
+    recover_conduct,
     stated,
     study_answers,
 )
@@ -109,6 +110,7 @@ def enter_sheet(
     reasons = stated(who=who)
     day = None if on is None else past_day("on", on, now)
     _check_device(device)
+    recover_conduct(study)
     sheet, rows, form = filled_sheet(study, protocol, file, rater, session)
     _refuse_answered(study, sheet, rows, rater)
     log_file = study.log_file(rater, session)

@@ -23,6 +23,7 @@ from masrel.lab.conduct._statements import refuse_withdrawn
 from masrel.lab.conduct._study_log import (
     append_event,
     check_choice,
+    recover_conduct,
     stated,
     study_answers,
 )
@@ -173,6 +174,7 @@ def run_session(
         )
     _refuse_unknown_coefficients(protocol, study.protocol)
     _check_device(clock, protocol)
+    recover_conduct(study)
     refuse_withdrawn(study, rater)
     if rehearsal:
         begun = begin_rehearsal(study, protocol, rater, session)

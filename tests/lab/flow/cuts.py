@@ -20,7 +20,8 @@ from typing import Any
 
 import pytest
 
-from masrel.lab.run import read_log
+from masrel.lab._event_log import events_before_torn
+from masrel.lab.run import Event, read_log
 
 NOTES = ".masrel_cache"  # of a report, beside it
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
@@ -53,11 +54,18 @@ def events_and_contents(root: Path) -> Contents:
     logs = [path for path in _whole_files(root) if path.suffix == ".jsonl"]
     events = {
         str(log.relative_to(root)): "".join(
-            f"{event.kind} {dict(event.fields)}\n" for event in read_log(log)
+            f"{event.kind} {dict(event.fields)}\n"
+            for event in _whole_events(log)
+            if event.kind != "recovered"
         )
         for log in logs
     }
     return contents(root) | events
+
+
+def _whole_events(log: Path) -> tuple[Event, ...]:
+    before_torn = events_before_torn(log)  # of what was cut in the middle of a line
+    return read_log(log) if before_torn is None else before_torn
 
 
 def _whole_files(root: Path) -> Iterator[Path]:
@@ -66,7 +74,7 @@ def _whole_files(root: Path) -> Iterator[Path]:
         # a cache notes when its files were written; what it holds is sealed, and held
         # by tests/lab/flow/test_report_builds.py
         left_out = any(part.startswith((".masrel-", NOTES)) for part in places)
-        if path.is_file() and not left_out:
+        if path.is_file() and not left_out and path.suffix != ".torn":
             yield path
 
 
@@ -100,15 +108,15 @@ class Cuts:
     left: list[Contents] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.before = contents(self.root)
+        self.before = events_and_contents(self.root)
 
     def look(self, _: str) -> None:
-        self.left.append(contents(self.root))
+        self.left.append(events_and_contents(self.root))
         check_links(self.root)
 
     def check(self) -> None:
         """Every file is the old or the new one, at every moment."""
-        check_old_or_new(self.before, self.left, contents(self.root))
+        check_old_or_new(self.before, self.left, events_and_contents(self.root))
 
 
 def check_old_or_new(before: Contents, left: list[Contents], after: Contents) -> None:
