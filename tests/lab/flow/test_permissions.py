@@ -55,9 +55,7 @@ ratings both
 analyze both
 report both --only flow
 status both --json status.json
-run both --rater R2 --session test --grades simulated
-ratings both
-analyze both
+run both --rater R2 --session test --grades simulated; ratings both; analyze both; \
 report both --only flow
 status raters both --json raters.json
 schedule show both --json orders.json
@@ -73,7 +71,7 @@ def wrong_modes(root: Path, umask: int, *, goes_on: bool) -> Iterator[str]:
     """Files and folders that have not the permissions that they are to have."""
     private = (*PRIVATE, WHILE_IT_GOES_ON) if goes_on else PRIVATE
     for path in sorted(root.rglob("*")):
-        name, usual = path.relative_to(root).as_posix(), 0o666
+        name = path.relative_to(root).as_posix()
         is_private = any(re.fullmatch(each, name) for each in private)
         if not is_private and not any(re.fullmatch(each, name) for each in OPEN):
             yield f"{name} is in no list"
@@ -101,19 +99,17 @@ def test_nothing_private_can_be_read_by_others(
         edit(protocol, "[report]", f"{TRAINING}\n[report]")
         goes_on = True
         for line in COMMANDS.strip().splitlines():
+            for command in line.split(";"):
+                run(*command.split())
             goes_on &= not line.startswith("run both")
-            run(*line.split())
-            is_old = line.startswith(("run both", "ratings both", "analyze both"))
-            if goes_on or not is_old:  # what it was made before is not made anew yet
-                wrong = [*wrong_modes(tmp_path, umask, goes_on=goes_on)]
-                assert wrong == [], line
+            assert [*wrong_modes(tmp_path, umask, goes_on=goes_on)] == [], line
     finally:
         os.umask(before)
 
 
 @pytest.mark.slow
 def test_what_a_demo_has_of_ratings_is_private_too(small_demo: Path) -> None:
-    study = small_demo / "study"
     for name in ("ratings", "sessions", "schedules", "conduct.jsonl"):
-        paths = [study / name, *(study / name).rglob("*")]
+        place = small_demo / "study" / name
+        paths = [place, *place.rglob("*")]
         assert {path.stat().st_mode & 0o077 for path in paths} == {0}
