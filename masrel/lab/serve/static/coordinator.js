@@ -450,7 +450,7 @@ function draw() {
   const x = (t) => 48 + ((t - start) / (end - start)) * (width - 60);
   const isSealed = Boolean(state.overview?.sealed); // then nothing says what is felt
   if (!isSealed) shadePhases(g, x, height);
-  chart(g, x, { low: 0, high: 180, step: 45, top: 18, bottom: height / 2 - 12, values: live.angle_deg, label: "Angle, deg", width });
+  chart(g, x, { low: 0, high: 180, step: 45, top: 18, bottom: isSealed ? height - 22 : height / 2 - 12, values: live.angle_deg, label: "Angle, deg", width });
   const most = Math.max(5, ...live.torque_nm.map(Math.abs)) * 1.1;
   const step = most > 12 ? 5 : 2.5;
   if (!isSealed) chart(g, x, { low: -most * 0.25, high: most, step, top: height / 2 + 18, bottom: height - 22, values: live.torque_nm, label: "Torque, N·m", width });
@@ -461,7 +461,7 @@ function draw() {
   g.fillText(`${start.toFixed(1)} s`, 48, height - 6);
   if (live.time_s.length) {
     const phase = phases[live.phase.at(-1)] ?? "";
-    const felt = isSealed ? "" : `, torque ${live.torque_nm.at(-1).toFixed(1)} N·m, ${phase}`;
+    const felt = isSealed ? "; the study is sealed, so its torque is not shown" : `, torque ${live.torque_nm.at(-1).toFixed(1)} N·m, ${phase}`;
     at("live-text").textContent = `Angle ${live.angle_deg.at(-1).toFixed(0)} deg${felt}.`;
   }
 }
