@@ -447,8 +447,10 @@ def _lock(descriptor: int, path: Path, wait_s: float) -> None:
             return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             if time.monotonic() >= until:
-                message = f"{path}: another process has this log open"
-                raise SessionLogInUseError(message) from error
+                waited = f", still after {wait_s:g} s: try again" if wait_s else ""
+                raise SessionLogInUseError(
+                    f"{path}: another process has this log open{waited}"
+                ) from error
         except OSError as error:
             error.filename = str(path)  # such as a file system without locks
             raise

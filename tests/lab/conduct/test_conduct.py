@@ -2,12 +2,21 @@
 
 import json
 import os
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 
 import pytest
 
-from masrel.errors import ParameterError, ScheduleError, SessionLogError
+from masrel.errors import (
+    ParameterError,
+    ScheduleError,
+    SessionLogError,
+    SessionLogInUseError,
+)
+from masrel.lab._event_log import SessionLog
 from masrel.lab.conduct import (
     Note,
     excluded_raters,
@@ -237,3 +246,34 @@ def test_a_changed_line_of_a_merged_log_is_found(small: Small) -> None:
     with pytest.raises(SessionLogError, match=r"north.jsonl: line 3: needed previous"):
         read_conduct(study)
     assert json.loads(moved.read_text().splitlines()[1])["fields"]["text"] == "c"
+
+
+EIGHT = """
+import os, sys
+from masrel.cli import cli
+for number in range(8):
+    if os.fork() == 0:
+        call = ["record", "note", sys.argv[1], f"note {number}", "--who", "MK"]
+        cli.main(call, standalone_mode=False)
+        os._exit(0)
+sys.exit(sum(os.wait()[1] != 0 for _ in range(8)))
+"""
+
+
+@pytest.mark.slow
+def test_eight_notes_at_once_wait_for_each_other_and_no_longer_than_5_s(
+    small: Small,
+) -> None:
+    study, protocol = small
+    with SessionLog.open(study.conduct_file):
+        process = subprocess.Popen([sys.executable, "-c", EIGHT, str(study.root)])
+        time.sleep(2)  # by then all of them wait
+    assert process.wait() == 0
+    texts = [str(event.fields["text"]) for event in read_conduct(study)]
+    assert sorted(texts) == [f"note {number}" for number in range(8)]
+    needed = f"{study.conduct_file}: another process has this log open, still after 5 s"
+    with (
+        SessionLog.open(study.conduct_file),
+        pytest.raises(SessionLogInUseError, match=needed),
+    ):
+        record_note(study, protocol, Note(text="a", who="MK"))

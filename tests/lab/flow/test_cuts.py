@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -20,7 +21,6 @@ from masrel.lab.schedule._secret import find_secret
 from masrel.lab.verification import verify_study
 from tests.cli.process import Caller
 from tests.faults import Faults
-from tests.files import edit
 from tests.lab.authority import authority
 from tests.lab.flow.conftest import run
 from tests.lab.flow.cuts import (
@@ -95,83 +95,6 @@ def to_report(root: Path, study: Path) -> None:
     run("ratings", str(root))
 
 
-def to_log(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    with (root / "protocol.toml").open("a", encoding="utf-8") as protocol:
-        protocol.write('\n[rater_fields.years]\ntype = "whole"\n')
-
-
-def to_include(root: Path, study: Path) -> None:
-    to_log(root, study)
-    run("record", "exclude", str(root), "--rater", "R2", *BY)
-
-
-def with_retest(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    with (root / "protocol.toml").open("a", encoding="utf-8") as protocol:
-        protocol.write(RETEST)
-    run("schedule", str(root))
-
-
-def to_enter(root: Path, study: Path) -> None:
-    with_retest(root, study)
-    to_type(root, "retest")
-
-
-def to_type(root: Path, session: str) -> None:
-    run("paper", "print", str(root), "--rater", "R1", "--session", session)
-    typed = root / "sheets" / f"{session}_R1.csv"
-    # a grade after the last comma of each row
-    typed.write_text(typed.read_text().replace(",\n", ",2\n"))
-
-
-def to_day(root: Path, study: Path) -> None:
-    with_retest(root, study)
-    simulate(root, "R1", "retest")
-
-
-def simulate(root: Path, rater: str, session: str) -> None:
-    by = ("--rater", rater, "--session", session, "--grades", "simulated", "--quiet")
-    run("run", str(root), *by)
-
-
-def to_amend(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    edit(root / "protocol.toml", '"fleiss_kappa"', '"gwet_ac"')
-
-
-def to_draw(root: Path, study: Path) -> None:
-    # nothing is drawn yet, and there is no secret
-    made = ("sessions", "schedules", "ratings", "*.jsonl", "a*.json", "published*")
-    shutil.copytree(study, root, ignore=shutil.ignore_patterns(*made))
-
-
-def to_seal(root: Path, study: Path) -> None:
-    to_draw(root, study)
-    secret = root / ".key" / "secret.txt"
-    secret.parent.mkdir(mode=0o700)
-    shutil.copy(study / "published_secret.txt", secret)
-    with (root / "protocol.toml").open("a", encoding="utf-8") as protocol:
-        protocol.write("\n[blinding]\nsealed = true\n")
-
-
-def to_run_sealed(root: Path, study: Path) -> None:
-    to_seal(root, study)
-    run("schedule", str(root))
-    simulate(root, "R2", "test")
-
-
-def to_unseal(root: Path, study: Path) -> None:
-    to_run_sealed(root, study)
-    simulate(root, "R1", "test")
-
-
-def to_run_paper(root: Path, study: Path) -> None:
-    made = ("*_R1.jsonl", "test_R1", "ratings", "a*.json")
-    shutil.copytree(study, root, ignore=shutil.ignore_patterns(*made))
-    to_type(root, "test")
-
-
 def to_stamp(root: Path, study: Path) -> None:
     shutil.copytree(study, root / "study")
 
@@ -191,15 +114,23 @@ def to_merge(root: Path, study: Path) -> None:
         shutil.rmtree(folder / "sessions" / f"test_{other}")
         for path in folder.glob(f"*/test_{other}*"):
             path.unlink()
-        run("record", "note", str(folder), f"the note of {site}", "--who", "Kim")
-        where = (str(folder), "--rater", rater, "--session", "test")
-        run("record", "day", *where, "--on", "2024-05-01", *BY)
-        onset = ("--onset", "2024-05-01", "--on", "2024-05-02")
-        run("record", "adverse-event", str(folder), "ill", *onset, "--who", "Kim")
-        edit(protocol, 'title = "', 'title = "Another ')
-        run("record", "amend", str(folder), *BY)
+        for event in AT_SITES:
+            run(*event.format(folder, rater).split())
 
 
+def to_others(verb: str, root: Path, study: Path) -> None:
+    without, added, calls = BEFORE.get(verb, ((), FIELDS, ()))
+    shutil.copytree(study, root, ignore=shutil.ignore_patterns(*without))
+    with (root / "protocol.toml").open("a", encoding="utf-8") as protocol:
+        protocol.write(added)
+    for call in calls:
+        run(*call.format(root).split())
+    for typed in root.glob("sheets/*_R1.csv"):  # a grade at the end of each row
+        typed.write_text(typed.read_text().replace(",\n", ",2\n"))
+
+
+FIELDS = '\n[rater_fields.years]\ntype = "whole"\n'
+SEALED = "\n[blinding]\nsealed = true\n"
 RETEST = """
 [[sessions]]
 id = "retest"
@@ -208,27 +139,54 @@ after = "test"
 at_least_days = 7
 order_policy = "warn"
 """
+MADE = ("ratings", "a*.json")
+DRAWN = ("sessions", "schedules", "*.jsonl", *MADE)
+BY_R1 = "run {0} --rater R1 --session test --grades simulated --quiet"
+BY_R2 = "run {0} --rater R2 --session test --grades simulated --quiet"
+# What a study is without, what its protocol has more, and what is called before
+BEFORE: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
+    "include": ((), "", ("record exclude {0} --rater R2 --who Kim --why ill",)),
+    "amend": ((), '\n[[report.gates]]\nrequire = "kappa.low >= 0.4"\n', ()),
+    "day": (
+        (),
+        RETEST,
+        (
+            "schedule {0}",
+            "run {0} --rater R1 --session retest --grades simulated --quiet",
+        ),
+    ),
+    "enter": (
+        (),
+        RETEST,
+        ("schedule {0}", "paper print {0} --rater R1 --session retest"),
+    ),
+    "draw": (("published*", *DRAWN), "", ()),
+    "register": (("published*", *DRAWN), "", ()),
+    "seal": (DRAWN, SEALED, ()),
+    "run-sealed": (DRAWN, SEALED, ("schedule {0}", BY_R2)),
+    "unseal": (DRAWN, SEALED, ("schedule {0}", BY_R1, BY_R2)),
+    "run-paper": (
+        ("*_R1.jsonl", "test_R1", *MADE),
+        "",
+        ("paper print {0} --rater R1 --session test",),
+    ),
+}
+AT_SITES = (
+    "record note {0} here --who Kim",
+    "record day {0} --rater {1} --session test --on 2024-05-01 --who Kim --why misread",
+    "record adverse-event {0} ill --on 2024-05-02 --onset 2024-05-01 --who Kim",
+    "record amend {0} --who Kim --why shorter",
+    "record rater add {0} --rater {1}b --session test --who Kim",
+)
 READY = "\n" * 200_000  # for all copies of a study
-BY = ("--who", "Kim", "--why", "for a test")
 PREPARE: dict[str, Callable[[Path, Path], None]] = {
     "init": to_init,
     "schedule": to_schedule,
     "ratings": to_ratings,
     "analyze": to_analyze,
     "report": to_report,
-    **dict.fromkeys(OTHERS, to_log),
-    "include": to_include,
-    "enter": to_enter,
     "merge": to_merge,
-    "amend": to_amend,
-    "day": to_day,
-    "draw": to_draw,
-    "register": to_draw,
-    "seal": to_seal,
-    "unseal": to_unseal,
     "stamp": to_stamp,
-    "run-paper": to_run_paper,
-    "run-sealed": to_run_sealed,
 }
 CALLS = {
     "schedule": "schedule {0} --redraw",
@@ -246,7 +204,7 @@ CALLS = {
     "unseal": "record unblind {0} --all --who Kim --why end",
     "stamp": "verify {0}/study --anchor {0}/kept.txt --stamp {1}",
     "run-paper": "run {0} --rater R1 --session test --grades paper --clock simulated",
-    "run-sealed": "run {0} --rater R1 --session test --grades simulated",
+    "run-sealed": BY_R1,
     "withdraw": "record withdraw {0} --rater R2 --who Kim --why left --on 2024-05-01",
     "exclude": "record exclude {0} --rater R2 --who Kim --why ill",
     "include": "record include {0} --rater R2 --who Kim --why well",
@@ -284,7 +242,7 @@ def prepared(
 
     def make(verb: str) -> tuple[Path, list[str]]:
         root = tmp_path / verb
-        PREPARE[verb](root, small_demo / "study")
+        PREPARE.get(verb, partial(to_others, verb))(root, small_demo / "study")
         address = request.getfixturevalue("service") if verb == "stamp" else None
         return root, CALLS.get(verb, f"{verb} {{0}}").format(root, address).split()
 
