@@ -22,6 +22,7 @@ from masrel.lab.conduct import (
     excluded_raters,
     rater_values,
     read_conduct,
+    record_new_rater,
     record_note,
     record_rater_values,
     record_standing,
@@ -219,6 +220,21 @@ def test_an_adverse_event_has_what_a_note_has_not(small: Small) -> None:
         note = Note(text="a", who="MK", kind="adverse-event", **wrong)
         with pytest.raises(ParameterError, match=needed):
             record_note(study, protocol, note)
+
+
+def test_a_late_rater_is_added_once_also_after_a_kill(small: Small) -> None:
+    study, protocol = small
+    for _ in range(2):
+        record_new_rater(study, protocol, "R9", ["test"], who="MK")
+        text = study.protocol.read_text(encoding="utf-8")
+        assert text.count('"R9"') == 2
+        (added,) = read_conduct(study)
+        study.conduct_file.unlink()  # killed before the log had it
+    assert (added.kind, added.fields["rater"]) == ("rater-added", "R9")
+    protocol = read_protocol(study.protocol)
+    record_new_rater(study, protocol, "R9", ["test"], who="MK")
+    with pytest.raises(ParameterError, match="who was not added before, R9 was on"):
+        record_new_rater(study, protocol, "R9", ["test"], who="MK")
 
 
 def test_merged_logs_are_read_in_order_of_time(small: Small) -> None:

@@ -203,9 +203,12 @@ def test_a_wrong_day_is_corrected_and_the_days_are_counted_anew(small: Small) ->
         "2026-05-16",
     ]
     # the day of the session before counts for the one after it
-    with pytest.warns(MasrelWarning, match="at least 7 days"):
-        record_day(study, protocol, "R1", "test", on="2026-05-10", **BY)
+    for _ in range(2):  # the second as after a kill: it is in the logs once
+        with pytest.warns(MasrelWarning, match="at least 7 days"):
+            record_day(study, protocol, "R1", "test", on="2026-05-10", **BY)
     assert intervals(study)[2:] == [(6, False)]
+    kinds = [event.kind for event in read_log(study.log_file("R1", "test"))]
+    assert kinds.count("day-correction") == 1
     for on in ("2999-01-01", "16.5.2026"):
         with pytest.raises(ParameterError, match="on: needed a day up to"):
             record_day(study, protocol, "R1", "test", on=on, **BY)
