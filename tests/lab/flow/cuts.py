@@ -37,6 +37,7 @@ _OPENS = ("open", "openat")
 _WRITES_TEXT = ("write", "writev", "pwrite64")  # which may name a folder
 
 Contents = dict[str, str]
+READY = "\n" * 200_000  # for as many copies of a study as there are
 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 
@@ -178,14 +179,19 @@ class Syscall:
         fast = [] if what.startswith("signal") else ["-f", "--seccomp-bpf"]
         traced = ["strace", *fast, "-o", os.devnull, "-e", f"trace={self.name}"]
         traced += ["-e", f"inject={self.name}:{what}:when={self.place}"]
-        return subprocess.run([*traced, *command], capture_output=True, text=True)
+        return run_ready([*traced, *command])
+
+
+def run_ready(command: list[str]) -> subprocess.CompletedProcess[str]:
+    """Run a command; whoever it asks presses Enter."""
+    return subprocess.run(command, input=READY, capture_output=True, text=True)
 
 
 def syscalls_on(root: Path, log: Path, command: list[str]) -> list[Syscall]:
     """Return the calls of a command that change anything in a folder, in order."""
     traced = ["strace", "-f", "--seccomp-bpf", "-y", "-s", "4096", "-o", str(log)]
     traced += ["-e", f"trace={','.join(SYSCALLS)}"]
-    subprocess.run([*traced, *command], check=True, capture_output=True)
+    assert run_ready([*traced, *command]).returncode == 0
     counts: dict[str, int] = defaultdict(int)
     found, threads = [], set()
     lines = log.read_text(errors="replace").splitlines()

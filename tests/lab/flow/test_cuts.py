@@ -2,7 +2,6 @@
 
 import math
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from tests.faults import Faults
 from tests.lab.authority import authority
 from tests.lab.flow.conftest import run
 from tests.lab.flow.cuts import (
+    READY,
     Contents,
     Cuts,
     Syscall,
@@ -34,6 +34,7 @@ from tests.lab.flow.cuts import (
     full_disk_at,
     killed_by_strace,
     masrel_command,
+    run_ready,
     syscalls_on,
 )
 
@@ -178,7 +179,6 @@ AT_SITES = (
     "record amend {0} --who Kim --why shorter",
     "record rater add {0} --rater {1}b --session test --who Kim",
 )
-READY = "\n" * 200_000  # for all copies of a study
 PREPARE: dict[str, Callable[[Path, Path], None]] = {
     "init": to_init,
     "schedule": to_schedule,
@@ -291,7 +291,7 @@ def test_a_full_disk_at_any_call_is_said_with_the_file(
 
 def check_disk_is_said_full(root: Path, err: str) -> None:
     *notes, said = err.splitlines()
-    assert all(note.startswith(("note: ", "read: ")) for note in notes)
+    assert all(note.startswith(("note: ", "read: ", "anchors: ")) for note in notes)
     assert "No space left on device" in said
     assert str(root) in said
     assert ".masrel-" not in said
@@ -309,6 +309,11 @@ class Traced:
     syscalls: list[Syscall] = field(default_factory=list)
     before: Contents = field(default_factory=dict)
     after: Contents = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """What is called, of a command with several rows."""
+        return CALLS.get(self.verb, self.verb).partition(" {0}")[0]
 
     def restore(self) -> None:
         shutil.rmtree(self.root)
@@ -371,7 +376,7 @@ def traced(prepared: Prepared, tmp_path: Path) -> Callable[[str], Traced]:
         shutil.copytree(root, traced.kept)
         command = masrel_command(*call)
         traced.syscalls = syscalls_on(root, tmp_path / "log", command)
-        traced.after = traced.seen()
+        traced.after = traced.finished() if verb in THEN else traced.seen()
         assert traced.after != traced.before
         return traced
 
@@ -393,7 +398,7 @@ EVERY = pytest.mark.parametrize(
         ),
         *(
             pytest.param(verb, 1.0, marks=[pytest.mark.long, pytest.mark.faults])
-            for verb in (*VERBS, *OTHERS)
+            for verb in (*VERBS, *OTHERS, *THEN)
         ),
     ],
 )
@@ -406,7 +411,8 @@ def test_a_kill_at_every_system_call(
     made = traced(verb)
     for syscall in some(made.syscalls, share):
         made.restore()
-        with faults(f"`{verb}` killed at a system call that changes a file"):
+        kind = f"`{made.name}` killed at a system call that changes a file"
+        with faults(kind):
             killed_by_strace(syscall, masrel_command(*made.call))
             made.check()
 
@@ -419,7 +425,8 @@ def test_a_full_disk_at_every_system_call(
     needs_space = [syscall for syscall in made.syscalls if syscall.needs_space]
     for syscall in some(needs_space, share):
         made.restore()
-        with faults(f"`{verb}` with a full disk at a system call that needs space"):
+        kind = f"`{made.name}` with a full disk at a system call that needs space"
+        with faults(kind):
             done = syscall.inject("error=ENOSPC", masrel_command(*made.call))
             if verb == "report" and done.returncode == 0:  # of its cache alone
                 assert events_and_contents(made.root) == made.after
@@ -449,9 +456,7 @@ def test_a_kill_at_a_random_moment_of_what_draws_records_or_runs(
     calls = [[part.replace(str(root), str(copy)) for part in call] for copy in copies]
     template = " ".join(call).replace(str(root), "{0}")
     command = [sys.executable, "-m", "tests.lab.run.kill_at", "call", "5", template]
-    done = subprocess.run(
-        [*command, *map(str, copies)], input=READY, capture_output=True, text=True
-    )
+    done = run_ready([*command, *map(str, copies)])
     assert done.returncode == 0, done.stderr
     kept = Traced(verb, root, root, call)
     whole = Traced(verb, copies[0], root, calls[0])
