@@ -24,6 +24,7 @@ from masrel.lab.analysis._descriptions import (
     stretching_speeds,
 )
 from masrel.lab.analysis._results import Analysis, PlannedEstimate, RaterEstimate
+from masrel.lab.conduct import PlanChange
 from masrel.lab.protocol import (
     EstimatePlan,
     Protocol,
@@ -44,6 +45,9 @@ from masrel.lab.ratings import (
 
 _SEALED_STILL = "which models were met is sealed"
 
+# What everybody may read of a change of the plan: not who, and not why
+_OF_CHANGE = ("key", "before", "after", "time_utc")
+
 
 def analyze(
     protocol: Protocol,
@@ -52,6 +56,7 @@ def analyze(
     in_person: InPerson | None = None,
     answers: Sequence[GivenAnswer] = (),
     excluded: Sequence[str] = (),
+    changes: Sequence[PlanChange] = (),
 ) -> Analysis:
     """Compute what the protocol's plan and report ask for.
 
@@ -70,6 +75,9 @@ def analyze(
         Raters who are left out of every number
         (`masrel.lab.conduct.excluded_raters`). The hashes of the inputs are of all
         ratings.
+    changes : sequence of PlanChange, optional
+        What has changed in the plan since it was drawn
+        (`masrel.lab.conduct.plan_changes`), which is said beside the numbers.
 
     Returns
     -------
@@ -136,6 +144,9 @@ def analyze(
         questionnaires=question_summaries(protocol, answers),
         simulated=ratings.simulated,
         excluded=tuple(excluded),
+        plan_changes=tuple(
+            {name: getattr(change, name) for name in _OF_CHANGE} for change in changes
+        ),
         inputs=inputs,
         masrel_version=masrel.__version__,
     )

@@ -51,6 +51,7 @@ def analyze(
             in_person=data.in_person,
             answers=data.answers,
             excluded=data.excluded,
+            changes=data.changes,
         )
     if output.json_file == STDOUT:
         write_json(library.as_analysis_document(analysis), STDOUT)

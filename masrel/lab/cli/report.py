@@ -287,6 +287,7 @@ def _made(
                 in_person=data.in_person,
                 answers=data.answers,
                 excluded=data.excluded,
+                changes=data.changes,
             )
         in_person, folder = data.in_person, data.paths.sessions
         material = gather(protocol, ratings, analysis, in_person, folder, conduct)

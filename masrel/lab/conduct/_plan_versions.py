@@ -5,16 +5,21 @@ Every draw and amendment leaves a copy of the protocol in the log of the study.
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import pairwise
-from pathlib import Path
+from itertools import chain, pairwise, takewhile
+from operator import itemgetter
 from typing import Any
 
+import msgspec
+
 import masrel
-from masrel.errors import ParameterError
-from masrel.lab._event_log import Event, utc_now
+from masrel.errors import MasrelError, ParameterError, SessionLogError
+from masrel.lab._event_log import Event, timed_events, utc_now
+from masrel.lab._study_files import as_then
 from masrel.lab.conduct._study_log import (
     VERSIONS,
     events_of_logs,
@@ -25,7 +30,7 @@ from masrel.lab.conduct._study_log import (
     version_of,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
-from masrel.lab.protocol.content import _content_differences
+from masrel.lab.protocol.content import _content_differences, _protocol_content
 from masrel.lab.schedule._secret import find_secret, new_secret
 
 # What decides what is rated, computed and required. The rest are words, or are held by
@@ -63,10 +68,10 @@ class PlanChange:
 
     def __str__(self) -> str:
         was, is_ = self.before or "not planned", self.after or "gone"
-        when = "and nobody has recorded it"
+        when = "nobody has recorded it"
         if self.time_utc is not None:
             when = f"recorded on {self.time_utc[:10]}"
-        return f"{self.key} was {was} at the draw and is {is_} since, {when}"
+        return f"Change of the plan: {self.key} was {was}, then {is_}; {when}"
 
 
 def plan_changes(study: StudyPaths, protocol: Protocol) -> tuple[PlanChange, ...]:
@@ -90,23 +95,81 @@ def plan_changes(study: StudyPaths, protocol: Protocol) -> tuple[PlanChange, ...
     SessionLogError
         If a log of the study is damaged.
     """
-    events = [event for _, event in events_of_logs(study) if event.kind in VERSIONS]
-    if not events:
-        return ()
-    contents = [_content(event.fields) for event in events]
-    contents.append(_content(version_of(protocol)))
+    contents: list[tuple[object, Event | None]] = [
+        (_content(then, str(event.fields["texts_sha256"])), event)
+        for then, event in plan_versions(study)
+    ]
+    contents.append((_content(protocol, version_of(protocol)["texts_sha256"]), None))
     return tuple(
         change
-        for (before, after), event in zip(
-            pairwise(contents), [*events[1:], None], strict=True
-        )
+        for (before, _), (after, event) in pairwise(contents)
         for change in _between(before, after, event)
     )
 
 
-def _content(version: Mapping[str, object]) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(str(version["protocol"]))
-    return {**content, "texts of the scale": version["texts_sha256"]}
+def _content(protocol: Protocol, texts_sha256: str) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(_protocol_content(protocol))
+    return {**content, "texts of the scale": texts_sha256}
+
+
+def plan_versions(study: StudyPaths) -> list[tuple[Protocol, Event]]:
+    """Return each protocol that was kept, that of the first draw first, with the event.
+
+    A copy that has not its hash, or is no protocol, is refused.
+    """
+    versions = []
+    for log, event in events_of_logs(study):
+        if event.kind in VERSIONS:
+            text, sha256 = (
+                str(event.fields["protocol"]),
+                event.fields["protocol_sha256"],
+            )
+            got, kept = hashlib.sha256(text.encode()).hexdigest(), None
+            with suppress(msgspec.DecodeError):
+                kept = msgspec.json.decode(text, type=Protocol)
+            if kept is None or got != sha256:
+                raise SessionLogError(
+                    f"{log}: line {event.line}: {event.kind}: needed the protocol with "
+                    f"SHA-256 {sha256}, got {'another text' if kept is None else got}"
+                )
+            versions.append((kept, event))
+    return versions
+
+
+def is_of_earlier(
+    study: StudyPaths, protocol: Protocol, is_made: Callable[[Protocol], bool | None]
+) -> bool:
+    """Say whether something was made of a state that the record had earlier.
+
+    `is_made` says so of a protocol, and of what logs say while it is called, the latest
+    first; None, that the record had too little by then, and so at any earlier time.
+    """
+
+    def answer(then: Protocol) -> bool | None:
+        with suppress(MasrelError):
+            return is_made(then)
+        return False
+
+    kept = {protocol_hash(each): each for each, _ in plan_versions(study)}
+    for then in ({protocol_hash(protocol): protocol} | kept).values():
+        answers = (as_then(lines, answer, then) for lines in _states(study, protocol))
+        if any(takewhile(lambda answer: answer is not None, answers)):
+            return True
+    return False
+
+
+def _states(study: StudyPaths, protocol: Protocol) -> Iterator[Mapping[str, int]]:
+    # how many lines logs have, and had before each event, the last one first
+    logs = [*study.conduct_logs(), *study.logs()]
+    timed = sorted(chain(*map(timed_events, logs)), key=itemgetter(0))
+    n_lines = dict(Counter(str(log) for _, log, _ in timed))
+    yield n_lines
+    for _, log, event in reversed(timed):
+        n_lines[str(log)] -= 1
+        if event.kind == "unblinded":  # a sealed study was sealed before
+            schedules = (study.schedule_file(*of) for of in protocol.rater_sessions)
+            n_lines |= dict.fromkeys(map(str, schedules), 0)
+        yield n_lines
 
 
 def _between(before: Any, after: Any, event: Event | None) -> Iterator[PlanChange]:
@@ -158,20 +221,6 @@ def registration(study: StudyPaths, protocol: Protocol) -> dict[str, object]:
         **version,
         "protocol": json.loads(version["protocol"]),
     }
-
-
-def version_problems(study: StudyPaths) -> Iterator[tuple[Path, str]]:
-    """Yield where a log keeps another protocol than that whose hash it has."""
-    for log, event in events_of_logs(study):
-        if event.kind in VERSIONS:
-            text = str(event.fields["protocol"]).encode()
-            sha256, got = event.fields["protocol_sha256"], hashlib.sha256(text)
-            if got.hexdigest() != sha256:
-                yield (
-                    log,
-                    f"line {event.line}: {event.kind}: needed the protocol with "
-                    f"SHA-256 {sha256}, got one with {got.hexdigest()}",
-                )
 
 
 def record_amendment(

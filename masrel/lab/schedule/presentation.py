@@ -15,6 +15,7 @@ from masrel.lab._study_files import (
     check_format,
     csv_format,
     format_problem,
+    lines_then,
     once,
     read_regular,
     repeated,
@@ -359,7 +360,8 @@ def read_schedule(path: Path) -> Schedule:
         ),
     )
     opened_file = path.parent / _OPENED / path.name
-    if not schedule.is_closed or not opened_file.exists():
+    is_opened = opened_file.exists() and lines_then(path) is None
+    if not (schedule.is_closed and is_opened):
         return schedule
     opened = read_schedule(opened_file)
     if _closed(opened) != schedule:

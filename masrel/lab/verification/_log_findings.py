@@ -50,8 +50,9 @@ class Finding:
     Attributes
     ----------
     weight : {"broken", "stale", "doubt"}
-        What is stale was made of an earlier state of the record, by what it says
-        itself; a doubt may have an innocent reason. A record with these alone is whole.
+        Broken is what no state of the record can have been or made. What is stale was
+        made of an earlier state, or of something that no log keeps; a doubt may have an
+        innocent reason.
     path : Path
         The file or folder that it is about.
     message : str
