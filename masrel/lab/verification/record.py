@@ -50,6 +50,8 @@ _REPORT_FORMAT = "masrel report 1"  # what the manifest of a report says its for
 
 _MANIFEST = "manifest.json"
 
+_OTHER = "was made of another protocol, other ratings or another log"
+
 _SHOWN = 20  # differences of the table that are listed
 
 
@@ -315,14 +317,17 @@ def _numbers_findings(
     place, verb = (
         (path, "analyze") if report is None else (path.with_name(_MANIFEST), "report")
     )
+    # an earlier version may have written ratings in another format
+    former = None if numbers else made_of.get("ratings_sha256")
     seen: dict[str, object] = {}  # protocols that were tried, with what else was there
 
     def difference(then: Protocol) -> str | None:
-        material, inputs = _material(study, then, made_of)
+        material, inputs = _material(study, then, former)
         seen[inputs["protocol_sha256"]] = inputs.get("in_person_sha256")
         conduct = None if report is None else conduct_hash(study)
-        if inputs | ({} if conduct is None else {"conduct_sha256": conduct}) != made_of:
-            return "was made of another protocol, other ratings or another log"
+        beside = {} if conduct is None else {"conduct_sha256": conduct}
+        if inputs | beside != made_of:
+            return _OTHER
         return (
             _unlike(numbers, _leaves(material, inputs, computed)) if numbers else None
         )
@@ -330,18 +335,15 @@ def _numbers_findings(
     now, of = difference(protocol), str(made_of.get("protocol_sha256"))
     if now is None:
         return
-    weigh = broken
-    if is_of_earlier(study, protocol, lambda then: difference(then) is None):
+    # of what is made of the record as it is now, all else is another's
+    answers = {None: True, _OTHER: False if now == _OTHER else None}
+    is_known = seen.get(of, _OTHER) == made_of.get("in_person_sha256")
+    if is_of_earlier(study, protocol, lambda p: answers.get(difference(p), False)):
         weigh, now = stale, "is of an earlier state of the record"
-    elif (
-        of not in seen
-        or seen[of] != made_of.get("in_person_sha256")
-        or not study.logs()
-    ):
-        weigh, now = (
-            stale,
-            f"{now}, which no log has: nobody can tell whether it was changed by hand",
-        )
+    elif is_known and study.logs():
+        weigh = broken
+    else:
+        weigh, now = stale, f"{now}, which no log has: it may have been made up"
     yield weigh(place, f"{now}; masrel {verb} makes it anew")
 
 
@@ -356,11 +358,11 @@ def _unlike(numbers: Mapping[str, object], needed: Mapping[str, str]) -> str | N
 
 
 def _material(
-    study: StudyPaths, protocol: Protocol, made_of: Mapping[str, object]
+    study: StudyPaths, protocol: Protocol, former: object
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Return what a study is analysed from, by what its logs say, and the hashes of it.
 
-    That of ratings is what was written if it is of the same table in another format.
+    Of ratings it is `former` where that is of the same table in another format.
     """
     from masrel.lab.analysis._plan import _inputs
     from masrel.lab.ratings import (
@@ -377,10 +379,9 @@ def _material(
         ratings = read_study_data(study, protocol, allows_sealed=True).ratings
     in_person, answers = in_person_of(study, ratings), answers_of(study, protocol)
     inputs = _inputs(protocol, ratings, in_person, answers)
-    texts = _texts(ratings) if ratings.source_path is None else ()
-    sha256 = str(made_of.get("ratings_sha256"))
-    if any(hashlib.sha256(text.encode()).hexdigest() == sha256 for text in texts):
-        inputs["ratings_sha256"] = sha256
+    texts = () if former is None or ratings.source_path else _texts(ratings)
+    if former in {hashlib.sha256(text.encode()).hexdigest() for text in texts}:
+        inputs["ratings_sha256"] = str(former)
     return {
         "protocol": protocol,
         "ratings": ratings,
