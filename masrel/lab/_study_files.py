@@ -19,7 +19,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from datetime import date, time
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, TextIO, TypeVar
 
 from masrel._files import (
@@ -322,7 +321,7 @@ _About = TypeVar("_About")
 _Answer = TypeVar("_Answer")
 
 _memory: ContextVar[dict[Any, Any] | None] = ContextVar("_memory", default=None)
-_then: ContextVar[Mapping[str, int]] = ContextVar("_then", default=MappingProxyType({}))
+_then: ContextVar[Mapping[str, int]] = ContextVar("_then")
 
 
 @contextmanager
@@ -347,7 +346,7 @@ def as_then(
 
 def lines_then(path: Path) -> int | None:
     """Return in how many lines a log says what it says; None for all there are."""
-    return _then.get().get(str(path))
+    return _then.get({}).get(str(path))
 
 
 def once(answer: Callable[[_About], _Answer]) -> Callable[[_About], _Answer]:
@@ -358,8 +357,11 @@ def once(answer: Callable[[_About], _Answer]) -> Callable[[_About], _Answer]:
         memory = _memory.get()
         if memory is None:
             return answer(about)
-        of = (str(about), lines_then(about)) if isinstance(about, Path) else id(about)
-        key = answer, of
+        key = (
+            (answer, str(about), lines_then(about))
+            if isinstance(about, Path)
+            else (answer, id(about))
+        )
         if key not in memory:
             memory[key] = about, answer(about)  # nothing else gets its id meanwhile
         result: _Answer = memory[key][1]

@@ -23,7 +23,6 @@ import masrel
 from masrel._files import write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab._event_log import Event
 from masrel.lab._study_files import MAX_TABLE, read_regular
 from masrel.lab.analysis import Analysis, analyze
 from masrel.lab.conduct._plan_versions import plan_changes, plan_versions
@@ -76,7 +75,7 @@ class _StudyFacts:
     n_corrections: int
     remarks: tuple[str, ...]
     raters: tuple[RaterProgress, ...]
-    frozen: Sequence[Event]  # which kept the plan, that of the first draw first
+    frozen: Sequence[object]  # events which kept the plan, that of the first draw first
     changes: Sequence[object]  # of the plan
     n_schedules: int  # drawn
     n_concealed: int  # of these, those drawn from a secret that is not published

@@ -45,9 +45,6 @@ from masrel.lab.ratings import (
 
 _SEALED_STILL = "which models were met is sealed"
 
-# What everybody may read of a change of the plan: not who, and not why
-_OF_CHANGE = ("key", "before", "after", "time_utc")
-
 
 def analyze(
     protocol: Protocol,
@@ -144,8 +141,14 @@ def analyze(
         questionnaires=question_summaries(protocol, answers),
         simulated=ratings.simulated,
         excluded=tuple(excluded),
-        plan_changes=tuple(
-            {name: getattr(change, name) for name in _OF_CHANGE} for change in changes
+        plan_changes=tuple(  # who changed it, and why, is not for everybody
+            {
+                "key": change.key,
+                "before": change.before,
+                "after": change.after,
+                "time_utc": change.time_utc,
+            }
+            for change in changes
         ),
         inputs=inputs,
         masrel_version=masrel.__version__,

@@ -77,8 +77,7 @@ def verify(
     verification = dataclasses.replace(verification, findings=findings)
     n: Counter[str] = Counter(finding.weight for finding in findings)
     if output.json_file is not None:
-        document = _document(verification, anchors)
-        write_json(document, output.json_file)
+        write_json(_document(verification, anchors), output.json_file)
     if output.json_file != STDOUT:
         _show(study, verification, anchors, n)
     sys.exit(2 if n["broken"] else 1 if n["stale"] else 0)
@@ -128,8 +127,10 @@ def _say_stamp(file: Path, service: str | None, authority: Path | None) -> None:
 def _document(
     verification: "Verification", anchors: "tuple[Anchor, ...]"
 ) -> dict[str, object]:
-    is_whole = verification.is_whole
-    document = {"is_whole": is_whole, **dataclasses.asdict(verification)}
+    document = {
+        "is_whole": verification.is_whole,
+        **dataclasses.asdict(verification),
+    }
     for finding in document["findings"]:
         finding["path"] = str(finding["path"])
     return {**document, "anchors": [dataclasses.asdict(anchor) for anchor in anchors]}

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import chain, pairwise, takewhile
 from operator import itemgetter
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -117,23 +118,24 @@ def plan_versions(study: StudyPaths) -> list[tuple[Protocol, Event]]:
 
     A copy that has not its hash, or is no protocol, is refused.
     """
-    versions = []
-    for log, event in events_of_logs(study):
-        if event.kind in VERSIONS:
-            text, sha256 = (
-                str(event.fields["protocol"]),
-                event.fields["protocol_sha256"],
-            )
-            got, kept = hashlib.sha256(text.encode()).hexdigest(), None
-            with suppress(msgspec.DecodeError):
-                kept = msgspec.json.decode(text, type=Protocol)
-            if kept is None or got != sha256:
-                raise SessionLogError(
-                    f"{log}: line {event.line}: {event.kind}: needed the protocol with "
-                    f"SHA-256 {sha256}, got {'another text' if kept is None else got}"
-                )
-            versions.append((kept, event))
-    return versions
+    return [
+        (_copy_of(log, event), event)
+        for log, event in events_of_logs(study)
+        if event.kind in VERSIONS
+    ]
+
+
+def _copy_of(log: Path, event: Event) -> Protocol:
+    text, copy = str(event.fields["protocol"]).encode(), None
+    with suppress(msgspec.DecodeError):
+        copy = msgspec.json.decode(text, type=Protocol)
+    got, needed = hashlib.sha256(text).hexdigest(), event.fields["protocol_sha256"]
+    if copy is None or got != needed:
+        raise SessionLogError(
+            f"{log}: line {event.line}: {event.kind}: needed the protocol with SHA-256 "
+            f"{needed}, got {'another text' if copy is None else got}"
+        )
+    return copy
 
 
 def is_of_earlier(
@@ -150,8 +152,8 @@ def is_of_earlier(
             return is_made(then)
         return False
 
-    kept = {protocol_hash(each): each for each, _ in plan_versions(study)}
-    for then in ({protocol_hash(protocol): protocol} | kept).values():
+    versions = {protocol_hash(each): each for each, _ in plan_versions(study)}
+    for then in ({protocol_hash(protocol): protocol} | versions).values():
         answers = (as_then(lines, answer, then) for lines in _states(study, protocol))
         if any(takewhile(lambda answer: answer is not None, answers)):
             return True
@@ -160,15 +162,16 @@ def is_of_earlier(
 
 def _states(study: StudyPaths, protocol: Protocol) -> Iterator[Mapping[str, int]]:
     # how many lines logs have, and had before each event, the last one first
-    logs = [*study.conduct_logs(), *study.logs()]
-    timed = sorted(chain(*map(timed_events, logs)), key=itemgetter(0))
+    logs = map(timed_events, [*study.conduct_logs(), *study.logs()])
+    timed = sorted(chain(*logs), key=itemgetter(0))
     n_lines = dict(Counter(str(log) for _, log, _ in timed))
     yield n_lines
     for _, log, event in reversed(timed):
         n_lines[str(log)] -= 1
         if event.kind == "unblinded":  # a sealed study was sealed before
-            schedules = (study.schedule_file(*of) for of in protocol.rater_sessions)
-            n_lines |= dict.fromkeys(map(str, schedules), 0)
+            n_lines |= {
+                str(study.schedule_file(*place)): 0 for place in protocol.rater_sessions
+            }
         yield n_lines
 
 

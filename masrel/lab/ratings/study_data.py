@@ -5,7 +5,6 @@ import math
 import statistics
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -23,8 +22,14 @@ from masrel.lab._study_files import (
 )
 from masrel.lab.conduct import PlanChange, excluded_raters, plan_changes
 from masrel.lab.conduct._plan_versions import is_of_earlier
+from masrel.lab.progress import raters_csv
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
-from masrel.lab.ratings.answers import GivenAnswer, answers_of
+from masrel.lab.ratings.answers import (
+    GivenAnswer,
+    answers_csv,
+    answers_from_logs,
+    answers_of,
+)
 from masrel.lab.ratings.study_file import InPerson, read_in_person, read_study_ratings
 from masrel.lab.ratings.table import (
     _FORMAT,
@@ -116,8 +121,9 @@ def read_study_data(
         is_stale, problem = _table_problem(study, protocol)
         if problem and not is_stale:
             raise RatingsError(problem)
-        note = f"; {problem}" if problem else ""
-        read = f"{len(ratings.rows)} ratings from the logs in {study.sessions}{note}"
+        read = f"{len(ratings.rows)} ratings from the logs in {study.sessions}" + (
+            f"; {problem}" if problem else ""
+        )
     else:
         source = file or _file_of(study)
         ratings = read_study_ratings(source, scale_of(protocol))
@@ -177,37 +183,34 @@ def _file_of(study: StudyPaths) -> Path:
 
 def _table_problem(study: StudyPaths, protocol: Protocol) -> tuple[bool, str]:
     """Return whether ``ratings.csv`` is out of date, and what is wrong with it."""
-    path, texts = study.ratings_file, partial(_texts_of_logs, study)
-    is_stale, differences = _table_differences(
-        study, protocol, path, texts, newest=_FORMAT
-    )
+    path = study.ratings_file
+    is_stale, differences = _table_differences(study, protocol, path)
     if not differences:
         return False, ""
-    said = "is out of date" if is_stale else "is not what the session logs say"
     more = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
     return is_stale, (
-        f"{path}: {said}: {differences[0]}{more}; masrel ratings writes it anew, "
-        f"--ratings {path} uses it as it is"
+        f"{path}: is {'out of date' if is_stale else 'not what the session logs say'}: "
+        f"{differences[0]}{more}; masrel ratings writes it anew, --ratings {path} uses "
+        "it as it is"
     )
-
-
-def _texts_of_logs(study: StudyPaths, protocol: Protocol) -> Iterator[str]:
-    return _texts(ratings_from_logs(study, protocol, check_recordings=False))
 
 
 def _table_differences(
-    study: StudyPaths,
-    protocol: Protocol,
-    path: Path,
-    texts: Callable[[Protocol], Iterable[str]],
-    *,
-    newest: int,
+    study: StudyPaths, protocol: Protocol, path: Path
 ) -> tuple[bool, list[str]]:
     """Return whether a table is what logs said once, and how it differs from them now.
 
-    `texts` are all that a table of these logs has ever been, and `newest` is the
-    version of its format. A file that is not there differs in nothing.
+    It is that of ratings, of answers or of raters; one that is not there differs in
+    nothing.
     """
+    # all that a table of the same logs has ever been
+    texts: Callable[[Protocol], Iterable[str]] = {
+        study.ratings_file: lambda then: _texts(
+            ratings_from_logs(study, then, check_recordings=False)
+        ),
+        study.answers_file: lambda then: [answers_csv(answers_from_logs(study, then))],
+        study.raters_file: lambda then: [raters_csv(study, then)],
+    }[path]
     if not path.is_file():
         return False, []
     text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
@@ -224,7 +227,8 @@ def _table_differences(
         return False, []
     if is_of_earlier(study, protocol, is_made):
         return True, ["needed what the logs say, got what they said earlier"]
-    return False, [*_line_differences(text, [*texts(protocol)], newest)]
+    known, is_of_ratings = [*texts(protocol)], path == study.ratings_file
+    return False, [*_line_differences(text, known, _FORMAT if is_of_ratings else 1)]
 
 
 def _line_differences(text: str, known: list[str], newest: int) -> Iterator[str]:

@@ -3,9 +3,8 @@
 import hashlib
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -152,9 +151,10 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
         check_session(study, protocol, session, rater)
         for rater, session in protocol.rater_sessions
     ]
-    training_logs = [study.training_log_file(rater.id) for rater in protocol.raters]
     trained = [
-        check_training(study, protocol, log) for log in training_logs if log.is_file()
+        check_training(study, protocol, log)
+        for rater in protocol.raters
+        if (log := study.training_log_file(rater.id)).is_file()
     ]
     rehearsed = [
         check_rehearsal(study, protocol, log)
@@ -262,26 +262,13 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
 
 
 def _table_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
-    from masrel.lab.progress import raters_csv
-    from masrel.lab.ratings import answers_csv, answers_from_logs
-    from masrel.lab.ratings.study_data import _table_differences, _texts_of_logs
-    from masrel.lab.ratings.table import _FORMAT
+    from masrel.lab.ratings.study_data import _table_differences
 
-    made: dict[Path, tuple[Callable[[Protocol], Iterable[str]], int]] = {
-        study.ratings_file: (partial(_texts_of_logs, study), _FORMAT),
-        study.answers_file: (
-            lambda then: [answers_csv(answers_from_logs(study, then))],
-            1,
-        ),
-        study.raters_file: (lambda then: [raters_csv(study, then)], 1),
-    }
-    anew = "masrel ratings writes it anew"
-    for path, (texts, newest) in made.items():
-        is_stale, differences = _table_differences(
-            study, protocol, path, texts, newest=newest
-        )
+    for path in (study.ratings_file, study.answers_file, study.raters_file):
+        is_stale, differences = _table_differences(study, protocol, path)
         for difference in differences[:_SHOWN]:
-            yield (stale if is_stale else broken)(path, f"{difference}; {anew}")
+            message = f"{difference}; masrel ratings writes it anew"
+            yield (stale if is_stale else broken)(path, message)
         if len(differences) > _SHOWN:
             yield broken(
                 path, f"there are {len(differences) - _SHOWN} more differences"
@@ -298,12 +285,14 @@ def _numbers_findings(
     # of an analysis, that of a report with what the manifest says that this is made of
     from masrel.lab.analysis._results import ANALYSIS_FORMAT
 
-    numbers, problem = _document(path), "needed a JSON object, got none"
-    if numbers is not None:
-        newest = ANALYSIS_FORMAT
-        problem = format_problem(numbers.get("format", 1), newest=newest) or ""
-    if numbers is None or problem:
-        yield broken(path, problem)
+    numbers = _document(path)
+    problem = (
+        "needed a JSON object, got none"
+        if numbers is None
+        else format_problem(numbers.get("format", 1), newest=ANALYSIS_FORMAT)
+    )
+    if numbers is None or problem is not None:
+        yield broken(path, str(problem))
         return
     version, inputs = numbers.get("masrel_version"), report or numbers.get("inputs")
     made_of = inputs if isinstance(inputs, Mapping) else {}
@@ -350,11 +339,15 @@ def _numbers_findings(
 def _unlike(numbers: Mapping[str, object], needed: Mapping[str, str]) -> str | None:
     # at what place, and how, an analysis differs from one that was computed again
     made = dict(leaves({"format": 1, **numbers}, within=(dict, list)))
-    for place in (*needed, *made):
-        got, value = (each.get(place, "absent") for each in (made, needed))
-        if got != value:
-            return f"{place} is {got:.60}, but {value:.60} when it is computed again"
-    return None
+    return next(
+        (
+            f"{place} is {made.get(place, 'absent'):.60}, but "
+            f"{needed.get(place, 'absent'):.60} when it is computed again"
+            for place in (*needed, *made)
+            if made.get(place) != needed.get(place)
+        ),
+        None,
+    )
 
 
 def _material(
