@@ -267,8 +267,9 @@ def _table_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     for path in (study.ratings_file, study.answers_file, study.raters_file):
         is_stale, differences = _table_differences(study, protocol, path)
         for difference in differences[:_SHOWN]:
-            message = f"{difference}; masrel ratings writes it anew"
-            yield (stale if is_stale else broken)(path, message)
+            yield (stale if is_stale else broken)(
+                path, f"{difference}; masrel ratings writes it anew"
+            )
         if len(differences) > _SHOWN:
             yield broken(
                 path, f"there are {len(differences) - _SHOWN} more differences"
@@ -326,10 +327,9 @@ def _numbers_findings(
         return
     # of what is made of the record as it is now, all else is another's
     answers = {None: True, _OTHER: False if now == _OTHER else None}
-    is_known = seen.get(of, _OTHER) == made_of.get("in_person_sha256")
     if is_of_earlier(study, protocol, lambda p: answers.get(difference(p), False)):
         weigh, now = stale, "is of an earlier state of the record"
-    elif is_known and study.logs():
+    elif study.logs() and seen.get(of, _OTHER) == made_of.get("in_person_sha256"):
         weigh = broken
     else:
         weigh, now = stale, f"{now}, which no log has: it may have been made up"
