@@ -20,6 +20,7 @@ from masrel.lab.schedule._secret import find_secret
 from masrel.lab.verification import verify_study
 from tests.cli.process import Caller
 from tests.faults import Faults
+from tests.files import edit
 from tests.lab.authority import authority
 from tests.lab.flow.conftest import run
 from tests.lab.flow.cuts import (
@@ -58,44 +59,6 @@ def to_init(root: Path, _: Path) -> None:
     root.mkdir()
 
 
-def to_schedule(root: Path, study: Path) -> None:
-    # One schedule is stale and is drawn anew, one is there, one is not.
-    shutil.copytree(study, root)
-    for log in (root / "sessions").glob("*.jsonl"):
-        log.unlink()
-    protocol = root / "protocol.toml"
-    text = protocol.read_text()
-    assert "seed = " in text
-    protocol.write_text(text.replace("seed = ", "seed = 1", 1))
-    next(iter((root / "schedules").glob("*_R2.csv"))).unlink()
-
-
-def to_ratings(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    ratings = root / "ratings" / "ratings.csv"
-    ratings.write_text(ratings.read_text().replace(",simulated,", ",foreign,"))
-
-
-def to_analyze(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    (root / "analysis.json").write_text("{}\n")
-
-
-def to_report(root: Path, study: Path) -> None:
-    # Tables and figures of the new one differ from the old ones.
-    shutil.copytree(study, root)
-    protocol = root / "protocol.toml"
-    text = protocol.read_text().partition("[report]")[0]
-    protocol.write_text(f'{text}[report]\nsections = ["grades", "intended"]\n')
-    run("report", str(root), "--quiet")
-    sheet = root / "schedules" / "test_R2_sheet.csv"
-    code = sheet.read_text().splitlines()[-1].split(",")[1]
-    where = (str(root), "--rater", "R2", "--session", "test")
-    by = ("--who", "A", "--why", "b")
-    run("record", "correct", *where, "--code", code, "--grade", "4", *by)
-    run("ratings", str(root))
-
-
 def to_stamp(root: Path, study: Path) -> None:
     shutil.copytree(study, root / "study")
 
@@ -120,57 +83,71 @@ def to_merge(root: Path, study: Path) -> None:
 
 
 def to_others(verb: str, root: Path, study: Path) -> None:
-    without, added, calls = BEFORE.get(verb, ((), FIELDS, ()))
+    without, edits, calls = BEFORE.get(verb, ((), FIELDS, ()))
     shutil.copytree(study, root, ignore=shutil.ignore_patterns(*without))
-    with (root / "protocol.toml").open("a", encoding="utf-8") as protocol:
-        protocol.write(added)
+    for file, old, new in edits:
+        edit(root / file, old, new, 1)
     for call in calls:
         run(*call.format(root).split())
     for typed in root.glob("sheets/*_R1.csv"):  # a grade at the end of each row
         typed.write_text(typed.read_text().replace(",\n", ",2\n"))
 
 
-FIELDS = '\n[rater_fields.years]\ntype = "whole"\n'
-SEALED = "\n[blinding]\nsealed = true\n"
-RETEST = """
-[[sessions]]
-id = "retest"
-raters = ["R1"]
-after = "test"
-at_least_days = 7
-order_policy = "warn"
-"""
+def in_protocol(*lines: str) -> tuple[tuple[str, str, str], ...]:
+    """The edit that puts tables into a protocol."""
+    return (("protocol.toml", "[report]", "\n".join([*lines, "[report]"])),)
+
+
+FIELDS = in_protocol("[rater_fields.years]", 'type = "whole"')
+SEALED = in_protocol("[blinding]", "sealed = true")
+RETEST = in_protocol(
+    *("[[sessions]]", 'id = "retest"', 'raters = ["R1"]', 'after = "test"'),
+    *("at_least_days = 7", 'order_policy = "warn"'),
+)
+GATE = in_protocol("[[report.gates]]", 'require = "kappa.low >= 0.4"')
+SECTIONS = (
+    ("protocol.toml", "[report]", '[report]\nsections = ["grades", "intended"]'),
+)
 MADE = ("ratings", "a*.json")
 DRAWN = ("sessions", "schedules", "*.jsonl", *MADE)
-BY_R1 = "run {0} --rater R1 --session test --grades simulated --quiet"
-BY_R2 = "run {0} --rater R2 --session test --grades simulated --quiet"
-# What a study is without, what its protocol has more, and what is called before
-BEFORE: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
-    "include": ((), "", ("record exclude {0} --rater R2 --who Kim --why ill",)),
-    "amend": ((), '\n[[report.gates]]\nrequire = "kappa.low >= 0.4"\n', ()),
-    "day": (
+RUN = "run {{0}} --rater {} --session {} --grades simulated --quiet"
+BY_R1, BY_R2, AGAIN = (
+    RUN.format(*of) for of in (("R1", "test"), ("R2", "test"), ("R1", "retest"))
+)
+PRINT = "paper print {{0}} --rater R1 --session {}"
+# What a study is without, what is put into its files, and what is called before
+BEFORE: dict[
+    str, tuple[tuple[str, ...], tuple[tuple[str, str, str], ...], tuple[str, ...]]
+] = {
+    # One schedule is stale and is drawn anew, one is there, one is not.
+    "schedule": (
+        ("test_*.jsonl", "test_R2.csv"),
+        (("protocol.toml", "seed = ", "seed = 1"),),
         (),
-        RETEST,
+    ),
+    "ratings": ((), (("ratings/ratings.csv", ",simulated,", ",foreign,"),), ()),
+    "analyze": ((), (("analysis.json", "{", "{ "),), ()),
+    # Tables and figures of the new one differ from the old ones.
+    "report": (
+        (),
+        SECTIONS,
         (
-            "schedule {0}",
-            "run {0} --rater R1 --session retest --grades simulated --quiet",
+            "report {0} --quiet",
+            "record correct {0} --rater R2 --session test --code 27B --grade 4 "
+            "--who A --why b",
+            "ratings {0}",
         ),
     ),
-    "enter": (
-        (),
-        RETEST,
-        ("schedule {0}", "paper print {0} --rater R1 --session retest"),
-    ),
-    "draw": (("published*", *DRAWN), "", ()),
-    "register": (("published*", *DRAWN), "", ()),
+    "include": ((), (), ("record exclude {0} --rater R2 --who Kim --why ill",)),
+    "amend": ((), GATE, ()),
+    "day": ((), RETEST, ("schedule {0}", AGAIN)),
+    "enter": ((), RETEST, ("schedule {0}", PRINT.format("retest"))),
+    "draw": (("published*", *DRAWN), (), ()),
+    "register": (("published*", *DRAWN), (), ()),
     "seal": (DRAWN, SEALED, ()),
     "run-sealed": (DRAWN, SEALED, ("schedule {0}", BY_R2)),
     "unseal": (DRAWN, SEALED, ("schedule {0}", BY_R1, BY_R2)),
-    "run-paper": (
-        ("*_R1.jsonl", "test_R1", *MADE),
-        "",
-        ("paper print {0} --rater R1 --session test",),
-    ),
+    "run-paper": (("*_R1.jsonl", "test_R1", *MADE), (), (PRINT.format("test"),)),
 }
 AT_SITES = (
     "record note {0} here --who Kim",
@@ -181,10 +158,6 @@ AT_SITES = (
 )
 PREPARE: dict[str, Callable[[Path, Path], None]] = {
     "init": to_init,
-    "schedule": to_schedule,
-    "ratings": to_ratings,
-    "analyze": to_analyze,
-    "report": to_report,
     "merge": to_merge,
     "stamp": to_stamp,
 }
