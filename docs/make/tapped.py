@@ -1,6 +1,6 @@
 """The pages of a study with nobody at them: what raters would tap is sent to them.
 
-``python -m tests.lab.serve.hands STUDY SESSION RATER=GRADE,GRADE…`` takes the place of
+``python -m docs.make.tapped STUDY SESSION RATER=GRADE,GRADE…`` takes the place of
 ``masrel serve STUDY`` and of whoever sits at its pages, for one session each.
 """
 
@@ -23,7 +23,7 @@ def graded(root: Path, session: str, grades: dict[str, list[str]]) -> None:
             await desk.done("start", rater=rater, session=session)
             while (state := await tablet.state())["screen"] != "over":
                 if state["ask"] is None:
-                    await asyncio.sleep(0.005)
+                    await asyncio.sleep(0.05)
                 else:
                     await tablet.answer(state, **_answer(state, script))
 
