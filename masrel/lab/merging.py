@@ -153,14 +153,17 @@ def _comparable(protocol: Protocol, raters: set[str]) -> dict[str, Any]:
 
 
 def _check_secrets(studies: Sequence[StudyPaths]) -> None:
-    commitments: list[tuple[Path, str | None]] = []
-    for study in studies:
-        for file in sorted(study.schedules.glob("*.csv")):
-            if not file.name.endswith("_sheet.csv"):
-                commitments.append((file, read_schedule(file).commitment))
-        secret = find_secret(study)
-        if secret is not None:
-            commitments.append((study.secret_file, secret.commitment))
+    commitments = [
+        (file, read_schedule(file).commitment)
+        for study in studies
+        for file in sorted(study.schedules.glob("*.csv"))
+        if not file.name.endswith("_sheet.csv")
+    ]
+    commitments += [
+        (study.secret_file, secret.commitment)
+        for study in studies
+        if (secret := find_secret(study)) is not None
+    ]
     for place, commitment in commitments:
         first, needed = commitments[0]
         if commitment != needed:

@@ -41,6 +41,7 @@ def analyze(
     Prints the tables and writes STUDY/analysis.json, or the file of --json.
     """
     from masrel.lab import analysis as library
+    from masrel.lab.report import study_conduct
 
     data = read_study(study, ratings_file)
     gates = gating.gates(data.protocol)
@@ -58,23 +59,16 @@ def analyze(
         conclude(verdict_of(analysis, gates), gating)
         return
     destination = output.json_file or data.paths.analysis_file
+    conduct = study_conduct(data.paths, data.protocol, file=ratings_file)
     library.write_analysis(
         analysis,
         destination,
         within=None if output.json_file else study,
-        is_private=_goes_on(data),
+        is_private=conduct is not None and conduct.goes_on,
     )
     _show(data, analysis, csv=bool(output.csv), raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
     conclude(verdict_of(analysis, gates), gating)
-
-
-def _goes_on(data: "StudyData") -> bool:
-    from masrel.lab.progress import open_sessions, rater_progress, session_progress
-
-    study, protocol = data.paths, data.protocol
-    sessions = session_progress(study, protocol) if study.logs() else ()
-    return bool(open_sessions(sessions, rater_progress(study, protocol, sessions)))
 
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:

@@ -100,12 +100,11 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
 
 def _set_modes(folder: Path, files: Iterable[str], *, is_private: bool) -> None:
     # also of what has not changed
-    paths = [folder / place for place in files]
-    folders = {path.parent for path in paths} - {folder}
-    if (folder.parent / "protocol.toml").is_file():  # any other may be somebody's
-        folders.add(folder)
-    for path in (*paths, *folders):
-        mode = 0o777 if path in folders else 0o666
+    modes = {folder / place: 0o666 for place in files}
+    modes |= {path.parent: 0o777 for path in modes}
+    if not (folder.parent / "protocol.toml").is_file():  # it may be somebody's
+        del modes[folder]
+    for path, mode in modes.items():
         path.chmod(mode & 0o700 if is_private else usual_mode(mode))
 
 
