@@ -186,8 +186,8 @@ BEFORE = (
     "status STUDY --json -",
     "ratings STUDY",
     "report STUDY --require kappa.value>=0",
-    "record note STUDY tired --who MK",
     "verify STUDY",
+    "record note STUDY tired --who MK",
 )
 REFUSED = (
     "analyze STUDY",
