@@ -559,7 +559,7 @@ def _to_make(
             why = f"{done}; {file.name} is "
             why += "not there yet" if made < 0 else "older than the logs"
             return _step(study, verb, why)
-    return _step(study, "verify", f"{done}, and their report is written")
+    return _step(study, "verify", f"{done}, and the report is written")
 
 
 def study_status(study: StudyPaths, protocol: Protocol) -> dict[str, Any]:
