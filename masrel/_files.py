@@ -34,7 +34,8 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 # Where a study's primary records are, which no output replaces
 _PROTOCOL = "protocol.toml"
-_RECORD_FOLDERS = ("schedules", "sessions", "conduct", ".key")
+_KEY = ".key"  # also of a study that has no protocol yet
+_RECORD_FOLDERS = ("schedules", "sessions", "conduct", _KEY)
 # What in a study says who is who, who rated what, or what was presented
 _PRIVATE = (
     *_RECORD_FOLDERS,
@@ -68,8 +69,8 @@ def write_files(
 ) -> None:
     """Write files that belong together: all on disk before the first has its name."""
     # They get their names, or go where there is None, in this order. Text is UTF-8 with
-    # lines as they are. mode: permissions; unless given those of what is replaced, or
-    # its owner's alone where a study has what is private, or the usual ones
+    # lines as they are. mode: permissions; unless given its owner's alone where a study
+    # has what is private, or those of what is replaced, or the usual ones
     parts: dict[Path, Path] = {}
     try:
         for path, data in contents.items():
@@ -110,7 +111,7 @@ def new_part(
         check_inside(path.parent, within)
     replaced = _mode(path)
     if mode is None:
-        mode = replaced or (0o600 if _is_private(path) else None)
+        mode = 0o600 if _is_private(path) else replaced
     make_folder(path.parent)
     part = path.with_name(f"{PART_BEGINS}{os.urandom(8).hex()}{PART_ENDS}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_FOLLOW | BINARY
@@ -164,9 +165,16 @@ def _mode(path: Path) -> int | None:
     return stat.S_IMODE(mode)
 
 
+def usual_mode(mode: int) -> int:
+    """Return what the umask leaves of permissions."""
+    umask = os.umask(0o077)  # it cannot be looked at alone
+    os.umask(umask)
+    return mode & ~umask
+
+
 def _is_private(path: Path) -> bool:
     path = path.absolute()
-    return any(
+    return _KEY in path.parts or any(
         (root / _PROTOCOL).is_file() and path.relative_to(root).parts[0] in _PRIVATE
         for root in path.parents
     )

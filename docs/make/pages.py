@@ -8,18 +8,21 @@ A page is run from top to bottom in a new folder that has a copy of ``studies``:
 - blocks of Python in one namespace. What they print stands in ``# prints`` comments
   (``...`` for any line), or after the word "prints" in a block of text;
 - lines that begin with ``$``. What they print, errors included, stands below them, and
-  a line of ``...`` for any lines;
+  a line of ``...`` for any lines, ``…`` in a line for any text;
 - a block below a paragraph that ends in "`name`:" is the file of that name.
 
 A comment in the line before a block says what a reader need not see: ``<!-- not run:
-needs a CAN bus -->``, or what is typed at the prompts of a command, ``<!-- typed:
-Enter, 1+, stop -->``. Whatever else could be run is an error.
+needs a CAN bus -->``; what is typed at the prompts of a command, ``<!-- typed: Enter,
+1+, stop -->``; or the module that is run in the place of the block, for a command that
+waits for browsers, ``<!-- instead: docs.make.tapped … -->``. Whatever else could
+be run is an error.
 """
 
 import contextlib
 import glob
 import io
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -73,7 +76,7 @@ class Block:
     @property
     def file(self) -> str | None:
         """The name of the file whose content it is."""
-        name = re.search(r"`([\w.]+)`:$", self.lead)
+        name = re.search(r"`([\w./]+)`:$", self.lead)
         return name[1] if name else None
 
     @property
@@ -81,6 +84,12 @@ class Block:
         kind, _, answers = self.marker.partition(": ")
         words = answers.split(", ") if kind == "typed" else []
         return ["" if word == "Enter" else word for word in words]
+
+    @property
+    def instead(self) -> list[str]:
+        """The module, and its arguments, that is run in the place of the block."""
+        kind, _, words = self.marker.partition(": ")
+        return shlex.split(words) if kind == "instead" else []
 
     def error(self, what: str) -> PageError:
         return PageError(f"{self.page}, line {self.number}: {what}")
@@ -141,23 +150,25 @@ def _check(block: Block) -> None:
         raise block.error("needs $ before a command, or to be marked as not run")
 
 
-def renewed(text: str, page: str = "page") -> str:
-    """Run a page; return it with what it prints now."""
+def renewed(text: str, page: str = "page", folder: Path | None = None) -> str:
+    """Run a page; return it with what it prints now, and keep its files in a folder."""
     lines = text.splitlines()
     blocks = read(text, page)
-    for block, new in reversed(list(zip(blocks, run(blocks), strict=True))):
+    for block, new in reversed(list(zip(blocks, run(blocks, folder), strict=True))):
         lines[block.number : block.number + len(block.lines)] = new
     return "\n".join(lines) + "\n"
 
 
-def run(blocks: Sequence[Block]) -> Iterator[list[str]]:
+def run(blocks: Sequence[Block], kept: Path | None = None) -> Iterator[list[str]]:
     """Run blocks in a new folder; yield the lines of each as they should be."""
-    with _new_folder():
+    with _new_folder() as folder:
         yield from _run(blocks)
+        if kept is not None:
+            shutil.copytree(folder, kept)
 
 
 @contextlib.contextmanager
-def _new_folder() -> Iterator[None]:
+def _new_folder() -> Iterator[str]:
     with (
         tempfile.TemporaryDirectory() as folder,
         contextlib.chdir(folder),
@@ -166,7 +177,7 @@ def _new_folder() -> Iterator[None]:
         warnings.simplefilter("error")
         shutil.copytree(ROOT / "studies", "studies")
         try:
-            yield
+            yield folder
         finally:
             if pyplot := sys.modules.get("matplotlib.pyplot"):  # it keeps every figure
                 pyplot.close("all")
@@ -185,12 +196,23 @@ def _run(blocks: Sequence[Block]) -> Iterator[list[str]]:
             yield block.lines if is_below else _commented(block.lines, printed)
         elif block.is_output:
             yield printed
+        elif block.instead:
+            _run_module(*block.instead)
+            yield block.lines
         elif block.has_commands:
             yield list(_answered(block))
         else:
             if block.file:
                 Path(block.file).write_text("\n".join(block.lines) + "\n", "utf-8")
             yield block.lines
+
+
+def _run_module(module: str, *arguments: str) -> None:
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        mock.patch.object(sys, "argv", [module, *arguments]),
+    ):
+        runpy.run_module(module, run_name="__main__")
 
 
 def _printed(block: Block, namespace: dict[str, object]) -> list[str]:
@@ -284,7 +306,8 @@ def _rows(output: str) -> list[str]:
 def _elided(shown: Sequence[str], printed: Sequence[str]) -> list[str]:
     """Return what is shown if it is what was printed, or the latter cut as it was."""
     pattern = "".join(
-        r"(?:.*\n)*" if line == "..." else re.escape(line) + r"\n" for line in shown
+        r"(?:.*\n)*" if line == "..." else re.escape(line).replace("…", ".*") + r"\n"
+        for line in shown
     )
     if re.fullmatch(pattern, "".join(f"{line}\n" for line in printed)):
         return list(shown)

@@ -182,11 +182,12 @@ def write_output(
     notes: tuple[str, ...] = (),
     more: "Sequence[Table]" = (),
     width: int | None = None,
+    mode: int | None = None,
 ) -> None:
     """Write and print a result in the forms that were chosen, and make no other."""
     # stamp: what the figure says of its data; notes: those of a table, which are on
     # stderr where JSON is printed; more: tables below the first; width: to which notes
-    # of a text are wrapped
+    # of a text are wrapped; mode: permissions of what is written
     if output.json_file == STDOUT:
         echo_notes(notes)
     else:  # first: a disk that is full then loses no result
@@ -196,13 +197,14 @@ def write_output(
             if output.csv and not isinstance(table, str):
                 echo_notes((*table.read, *table.notes))
     if output.json_file is not None:
-        write_json(document(), output.json_file)
+        write_json(document(), output.json_file, mode=mode)
     if figure is not None and output.figure is not None:
         # Imported here: a table loads nothing that draws.
         from masrel.plots import draw
 
         form = _FORMS[output.figure.suffix.lower()]
-        write_file(output.figure, draw(figure(), stamp=stamp, forms=(form,))[form])
+        picture = draw(figure(), stamp=stamp, forms=(form,))[form]
+        write_file(output.figure, picture, mode=mode)
         click.echo(f"figure: {output.figure}", err=True)
     if html is not None and output.html is not None:
         write_file(output.html, html())
@@ -222,7 +224,9 @@ def _shown(part: "Table | str", output: OutputOptions, width: int | None) -> str
     return as_text(part, width=width)
 
 
-def write_json(document: dict[str, object], file: Path) -> None:
+def write_json(
+    document: dict[str, object], file: Path, *, mode: int | None = None
+) -> None:
     """Write a document, or print it where the file is "-"; it names its format."""
     if "format" not in document:
         context = click.get_current_context()
@@ -232,7 +236,7 @@ def write_json(document: dict[str, object], file: Path) -> None:
         document = {"format": f"masrel {named} {_FORMAT}", **document}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file != STDOUT:
-        write_file(file, text + "\n")
+        write_file(file, text + "\n", mode=mode)
         return
     try:
         text.encode(sys.stdout.encoding or "utf-8")

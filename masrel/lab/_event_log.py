@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from itertools import accumulate
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Self
@@ -24,7 +25,9 @@ from masrel.lab._study_files import (
     MAX_TABLE,
     Fact,
     Facts,
+    as_then,
     format_problem,
+    lines_then,
     no_follow,
     once,
     parse_json,
@@ -84,6 +87,8 @@ def read_log(path: Path) -> tuple[Event, ...]:
         If the file is missing, a line is not an event, a line does not carry the
         hash of the line before, or the last line is torn.
     """
+    if (n_lines := lines_then(path)) is not None:
+        return as_then({}, read_log, path)[:n_lines]
     lines, torn = _split_lines(_read(path))
     if torn:
         raise SessionLogError(
@@ -91,6 +96,16 @@ def read_log(path: Path) -> tuple[Event, ...]:
             "interrupted; the command that wrote it recovers the log when called again"
         )
     return _verify(path, lines)
+
+
+def timed_events(log: Path) -> list[tuple[str, Path, Event]]:
+    """Return the events of a log, each with its time and the log.
+
+    Where a clock was set back it is the latest time so far, so that no order changes.
+    """
+    events = read_log(log)
+    latest = accumulate((event.time_utc for event in events), max)
+    return [(time, log, event) for time, event in zip(latest, events, strict=True)]
 
 
 def events_before_torn(path: Path) -> tuple[Event, ...] | None:
@@ -447,8 +462,10 @@ def _lock(descriptor: int, path: Path, wait_s: float) -> None:
             return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             if time.monotonic() >= until:
-                message = f"{path}: another process has this log open"
-                raise SessionLogInUseError(message) from error
+                waited = f", still after {wait_s:g} s: try again" if wait_s else ""
+                raise SessionLogInUseError(
+                    f"{path}: another process has this log open{waited}"
+                ) from error
         except OSError as error:
             error.filename = str(path)  # such as a file system without locks
             raise

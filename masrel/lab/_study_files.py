@@ -16,7 +16,7 @@ import shutil
 import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
 from datetime import date, time
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
@@ -335,6 +335,7 @@ _About = TypeVar("_About")
 _Answer = TypeVar("_Answer")
 
 _memory: ContextVar[dict[Any, Any] | None] = ContextVar("_memory", default=None)
+_then: ContextVar[Mapping[str, int]] = ContextVar("_then")
 
 
 @contextmanager
@@ -348,6 +349,20 @@ def read_once() -> Iterator[None]:
         _memory.reset(token)
 
 
+def as_then(
+    n_lines: Mapping[str, int], answer: Callable[[_About], _Answer], about: _About
+) -> _Answer:
+    """Return what a function says while logs say no more than in so many lines."""
+    context = copy_context()
+    context.run(_then.set, n_lines)
+    return context.run(answer, about)
+
+
+def lines_then(path: Path) -> int | None:
+    """Return in how many lines a log says what it says; None for all there are."""
+    return _then.get({}).get(str(path))
+
+
 def once(answer: Callable[[_About], _Answer]) -> Callable[[_About], _Answer]:
     """Remember within `read_once` what a function said of a path, or of an object."""
 
@@ -356,7 +371,11 @@ def once(answer: Callable[[_About], _Answer]) -> Callable[[_About], _Answer]:
         memory = _memory.get()
         if memory is None:
             return answer(about)
-        key = answer, str(about) if isinstance(about, Path) else id(about)
+        key = (
+            (answer, str(about), lines_then(about))
+            if isinstance(about, Path)
+            else (answer, id(about))
+        )
         if key not in memory:
             memory[key] = about, answer(about)  # nothing else gets its id meanwhile
         result: _Answer = memory[key][1]

@@ -25,6 +25,7 @@ from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_TABLE, read_regular
 from masrel.lab.analysis import Analysis, analyze
+from masrel.lab.conduct._plan_versions import plan_changes, plan_versions
 from masrel.lab.progress import (
     RaterProgress,
     SessionProgress,
@@ -70,6 +71,8 @@ class _StudyFacts:
     n_corrections: int
     remarks: tuple[str, ...]
     raters: tuple[RaterProgress, ...]
+    frozen: Sequence[object]  # events which kept the plan, that of the first draw first
+    changes: Sequence[object]  # of the plan
     n_schedules: int  # drawn
     n_concealed: int  # of these, those drawn from a secret that is not published
     files: Mapping[str, Sequence[Path]]  # by what they are, from the study's folder
@@ -101,6 +104,7 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
     sessions = session_progress(paths, protocol)
     named = {
         "protocol": [paths.protocol],
+        "conduct": paths.conduct_logs(),
         "logs": [log for _, log, _, _ in begun],
         "ratings": tables[:1],
     }
@@ -121,6 +125,8 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
         n_corrections=len(corrections_of(paths, protocol)),
         remarks=study_remarks(paths, protocol, include=()),
         raters=rater_progress(paths, protocol, sessions),
+        frozen=[event for _, event in plan_versions(paths)],
+        changes=plan_changes(paths, protocol),
         n_schedules=len(drawn),
         n_concealed=sum(s.commitment is not None for s in drawn) * (not is_published),
         files={
@@ -167,7 +173,7 @@ def _range_of(values: Sequence[float], unit: str) -> str:
 _State = Literal["filled", "in part", "authors"]
 
 
-_Source = Literal["protocol", "logs", "ratings"]
+_Source = Literal["protocol", "conduct", "logs", "ratings"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,7 +246,11 @@ _GUIDELINES: dict[str, tuple[str, str, tuple[_Item, ...]]] = {
                 facts=("independence",),
                 sources=("logs",),
             ),
-            _Item(topic="Statistical analysis", facts=("analysis",)),
+            _Item(
+                topic="Statistical analysis",
+                facts=("analysis", "plan"),
+                sources=("protocol", "conduct"),
+            ),
             _Item(
                 topic="Actual numbers",
                 facts=("numbers", "remarks"),

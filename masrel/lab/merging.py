@@ -5,6 +5,7 @@ raters alone. Out: a new folder with all raters, schedules, logs and recordings,
 verified before and after.
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -12,21 +13,20 @@ from typing import Any
 
 import msgspec
 
-from masrel._files import make_folder, write_files
+from masrel._files import write_files
 from masrel._input import refuse
 from masrel.errors import ParameterError, ProtocolError, ScheduleError
 from masrel.lab._event_log import line_hashes
 from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
-    leaves,
     new_folder,
     parse_toml,
     read_regular,
     toml_lines,
 )
 from masrel.lab.conduct._study_log import append_event
-from masrel.lab.paper._printing import has_answers
+from masrel.lab.paper._form import has_answers
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
@@ -34,6 +34,7 @@ from masrel.lab.protocol import (
     protocol_hash,
     read_protocol,
 )
+from masrel.lab.protocol.content import _content_differences
 from masrel.lab.schedule import read_schedule
 from masrel.lab.schedule._secret import find_secret
 from masrel.lab.verification import verify_study
@@ -83,14 +84,11 @@ def merge_studies(studies: Sequence[StudyPaths], destination: Path) -> StudyPath
     files = _files(studies, protocols, owners, names)
     with new_folder(destination) as part:
         merged = StudyPaths(part)
-        # For their owner alone from the start, however open the sources are: schedules
-        # and recordings name the models, and logs say who did what and why.
-        folders = {part / parent for name in files for parent in Path(name).parents}
-        for folder in sorted(folders):
-            make_folder(folder, mode=0o700)
-        for name, file in files.items():
-            write_files({part / name: _content(file)}, within=part, mode=0o600)
+        # First: in a study what is private is its owner's alone, however open the
+        # sources are.
         write_files({merged.protocol: _merged_protocol(studies)}, mode=0o600)
+        for name, file in files.items():
+            write_files({part / name: _content(file)}, within=part)
         protocol = read_protocol(merged.protocol)
         for fields in _merged_logs(studies, protocols, names, part):
             append_event(merged, protocol, "merged", fields)
@@ -131,16 +129,13 @@ def _check_protocols(
     # refuses protocols that differ in more than which raters take part
     for study, protocol in zip(studies[1:], protocols[1:], strict=True):
         raters = {r.id for r in protocols[0].raters} & {r.id for r in protocol.raters}
-        first, other = (
-            dict(leaves(_comparable(each, raters))) for each in (protocols[0], protocol)
-        )
-        for key in sorted({**first, **other}):
-            values = first.get(key, "none"), other.get(key, "none")
-            if values[0] != values[1]:
-                raise ProtocolError(
-                    f"{key}: needed the same in all protocols, got {values[0]} in "
-                    f"{studies[0].protocol} and {values[1]} in {study.protocol}"
-                )
+        one, another = (_comparable(each, raters) for each in (protocols[0], protocol))
+        for key, *values in _content_differences(one, another):
+            first, other = (json.dumps(each, ensure_ascii=False) for each in values)
+            raise ProtocolError(
+                f"{key}: needed the same in all protocols, got {first} in "
+                f"{studies[0].protocol} and {other} in {study.protocol}"
+            )
         if presented_hash(protocol) != presented_hash(protocols[0]):
             raise ProtocolError(
                 f"{study.protocol}: needed what {studies[0].protocol} presents, got "
@@ -149,27 +144,26 @@ def _check_protocols(
 
 
 def _comparable(protocol: Protocol, raters: set[str]) -> dict[str, Any]:
-    # content by the ids of its entries, with these raters, without who takes part when
+    # content with these raters, without who takes part when
     content: dict[str, Any] = msgspec.to_builtins(protocol)
     for session in content["sessions"]:
         del session["raters"]
-    content["raters"] = [r for r in content["raters"] if r["id"] in raters]
-    for array in ("models", "sessions"):
-        content[f"{array} in order"] = [entry["id"] for entry in content[array]]
-    for array in ("models", "raters", "sessions"):
-        content[array] = {entry["id"]: entry for entry in content[array]}
+    content["raters"] = {r["id"]: r for r in content["raters"] if r["id"] in raters}
     return content
 
 
 def _check_secrets(studies: Sequence[StudyPaths]) -> None:
-    commitments: list[tuple[Path, str | None]] = []
-    for study in studies:
-        for file in sorted(study.schedules.glob("*.csv")):
-            if not file.name.endswith("_sheet.csv"):
-                commitments.append((file, read_schedule(file).commitment))
-        secret = find_secret(study)
-        if secret is not None:
-            commitments.append((study.secret_file, secret.commitment))
+    commitments = [
+        (file, read_schedule(file).commitment)
+        for study in studies
+        for file in sorted(study.schedules.glob("*.csv"))
+        if not file.name.endswith("_sheet.csv")
+    ]
+    commitments += [
+        (study.secret_file, secret.commitment)
+        for study in studies
+        if (secret := find_secret(study)) is not None
+    ]
     for place, commitment in commitments:
         first, needed = commitments[0]
         if commitment != needed:
@@ -233,6 +227,7 @@ def _files(
             if owners.get(rater, study) != study
             for file in (
                 study.schedule_file(rater, session),
+                study.opened_file(rater, session),
                 study.sheet_file(rater, session),
                 study.typed_file(rater, session),
             )

@@ -8,23 +8,35 @@ import json
 import shlex
 from collections import Counter
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
-from operator import itemgetter
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from masrel.errors import SessionLogError
+from masrel.errors import MasrelError, SessionLogError
 from masrel.lab._event_log import Event, events_before_torn, utc_now
 from masrel.lab._study_files import MANIFEST, table_csv
-from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
+from masrel.lab.conduct import (
+    PlanChange,
+    excluded_raters,
+    plan_changes,
+    rater_values,
+    read_conduct,
+)
 from masrel.lab.conduct._study_log import events_of_logs
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
-from masrel.lab.run._days import Due, due_of
-from masrel.lab.run._state import FROM_PAPER, SessionState, read_session, replay
+from masrel.lab.run._days import Due, due_of, held_on
+from masrel.lab.run._state import (
+    FROM_PAPER,
+    NO_DEVICE,
+    SessionState,
+    read_session,
+    replay,
+)
 from masrel.lab.schedule import site_of_copy
-from masrel.lab.schedule._secret import rater_sessions_at
+from masrel.lab.schedule._secret import find_secret, rater_sessions_at
 from masrel.lab.schedule.presentation import _read_drawn
 
 __all__ = [
@@ -32,9 +44,11 @@ __all__ = [
     "RaterProgress",
     "SessionProgress",
     "next_step",
+    "open_sessions",
     "rater_progress",
     "raters_csv",
     "session_progress",
+    "study_status",
 ]
 
 # How far a session came
@@ -69,13 +83,13 @@ class SessionProgress:
         Whether grades or device are simulated.
     problem : str or None
         Why its log cannot be read, or None.
-    due_from, due_to : str or None
-        First and last day on which it may begin, ISO 8601, where the protocol has an
-        interval to the session before and that is complete.
-    is_overdue : bool
-        Whether it has not begun, and its last day is over.
-    refused : str or None
-        What it would be refused for today; None where it may begin or go on.
+    held_on : str or None
+        The day on which it was held, ISO 8601, as corrected; None before it has begun.
+    clock : str or None
+        Clock of the control loop; "none" where another program presented the models,
+        None before it has begun.
+    due : Due
+        When it may begin; without anything once it has begun.
     """
 
     session: str
@@ -95,10 +109,9 @@ class SessionProgress:
     grades_from: str | None = None
     simulated: bool = False
     problem: str | None = None
-    due_from: str | None = None
-    due_to: str | None = None
-    is_overdue: bool = False
-    refused: str | None = None
+    held_on: str | None = None
+    clock: str | None = None
+    due: Due = field(default_factory=Due)
 
 
 def session_progress(
@@ -149,7 +162,8 @@ def _progress(
         stage = "drawn"
     due = Due()
     if not state.header and problem is None:
-        due = due_of(study, protocol, rater, session, now)
+        with suppress(SessionLogError):  # the session before says it
+            due = due_of(study, protocol, rater, session, now)
     counts = Counter(event.kind for event in events)
     presented = [event for of_code in state.presented.values() for event in of_code]
     return SessionProgress(
@@ -170,21 +184,14 @@ def _progress(
         n_answers=counts["answered"],
         last_event=events[-1].kind if events else None,
         last_time_utc=events[-1].time_utc if events else None,
-        grades_from=state.source or _typed_from(study, rater, session),
+        grades_from=state.source,
         simulated=bool(state.header.get("simulated"))
         or any(event.fields["simulated"] for event in presented),
         problem=problem,
-        due_from=None if due.first is None else due.first.isoformat(),
-        due_to=None if due.last is None else due.last.isoformat(),
-        is_overdue=due.is_overdue,
-        refused=due.refused,
+        held_on=None if (day := held_on(events, state)) is None else day.isoformat(),
+        clock=str(state.header["clock"]) if state.header else None,
+        due=due,
     )
-
-
-def _typed_from(study: StudyPaths, rater: str, session: str) -> str | None:
-    # a sheet that was printed for it is waited for
-    is_printed = study.typed_file(rater, session).exists()
-    return FROM_PAPER if is_printed else None
 
 
 def _events(log: Path) -> tuple[tuple[Event, ...], SessionState, str | None]:
@@ -328,8 +335,7 @@ def _protocols_in_force(study: StudyPaths, protocol: Protocol) -> list[tuple[str
         events, state, _ = _events(study.log_file(rater, session))
         if (sha256 := state.header.get("protocol_sha256")) is not None:
             begun.append((events[0].time_utc, rater, str(sha256)))
-    begun.sort(key=itemgetter(0))
-    in_force = [(rater, sha256) for _, rater, sha256 in begun]
+    in_force = [(rater, sha256) for _, rater, sha256 in sorted(begun)]
     return in_force + [(each.id, protocol_hash(protocol)) for each in protocol.raters]
 
 
@@ -375,14 +381,17 @@ def raters_csv(study: StudyPaths, protocol: Protocol) -> str:
     sessions = session_progress(study, protocol)
     raters = rater_progress(study, protocol, sessions)
     simulated = any(session.simulated for session in sessions)
-    head = ["SIMULATED: not sessions of persons on hardware."] * simulated
-    head += ["Raters, one row each, as they stand in the study; NA is not known."]
+    head = [
+        *["SIMULATED: not sessions of persons on hardware."] * simulated,
+        "Raters, one row each, as they stand in the study; NA is not known.",
+        "format: 1",
+    ]
     columns = ["rater", "site", "status", "late", *protocol.rater_fields]
     rows = (
         (each.rater, each.site, each.status, each.is_late, *each.values.values())
         for each in raters
     )
-    return table_csv(columns, rows, head=[*head, "format: 1"])
+    return table_csv(columns, rows, head=head)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -412,6 +421,7 @@ def next_step(
     study: StudyPaths,
     sessions: Sequence[SessionProgress],
     raters: Sequence[RaterProgress],
+    changes: Sequence[PlanChange] = (),
 ) -> NextStep:
     """Say what is to be done next in a study.
 
@@ -423,79 +433,176 @@ def next_step(
         What `session_progress` returned.
     raters : sequence of RaterProgress
         What `rater_progress` returned.
+    changes : sequence of PlanChange, optional
+        What has changed in the plan.
 
     Returns
     -------
     NextStep
-        A command: what is damaged first, then what has begun, then what has not, and
-        what is made of complete sessions.
+        A command that would not be refused: what is damaged first, then a change of the
+        plan that nobody has recorded, then what has begun, then what has not, and what
+        is made of complete sessions.
     """
-    root = shlex.quote(str(study.root))
-    absent = {r.rater for r in raters if r.status in ("withdrawn", "excluded")}
-    open_ = [s for s in sessions if s.stage != "complete" and s.rater not in absent]
-    ready = [session for session in open_ if session.refused is None]
+    open_ = open_sessions(sessions, raters)
+    ready = [session for session in open_ if session.due.not_today is None]
     by_stage = {session.stage: session for session in reversed(ready)}
-    if "unreadable" in by_stage:
-        session = by_stage["unreadable"]
+    if session := by_stage.get("unreadable"):
         why = f"the log of {session.rater} in session {session.session} is damaged"
-        return _of_study("verify", root, why)
+        return _step(study, "verify", why)
+    if any(change.time_utc is None for change in changes):
+        why = "the plan has changed since the draw, and nobody has recorded it"
+        return _step(study, "record amend", why, " --who WHO --why WHY")
     if "not drawn" in by_stage and "begun" not in by_stage:
-        n_absent = sum(session.stage == "not drawn" for session in open_)
-        why = f"{n_absent} of {len(sessions)} schedules are not drawn"
-        return _of_study("schedule", root, why)
-    for stage in ("begun", "drawn"):
-        if stage in by_stage:
-            return _to_run(root, by_stage[stage], sessions)
-    return _to_await(root, open_) or _to_make(study, root)
+        n_left = sum(each.stage == "not drawn" for each in open_)
+        what = f"{n_left} of {len(sessions)} schedules are not drawn"
+        return _step(study, "schedule", what)
+    if session := by_stage.get("begun") or by_stage.get("drawn"):
+        return _to_run(study, session, sessions)
+    return _to_await(study, open_) or _to_make(study, sessions, len(open_))
 
 
-def _of_study(verb: str, root: str, why: str) -> NextStep:
-    return NextStep(command=f"masrel {verb} {root}", why=why, verb=verb)
+def open_sessions(
+    sessions: Sequence[SessionProgress], raters: Sequence[RaterProgress]
+) -> list[SessionProgress]:
+    """Return the sessions that are neither complete nor of a rater who has left.
+
+    Parameters
+    ----------
+    sessions : sequence of SessionProgress
+        What `session_progress` returned.
+    raters : sequence of RaterProgress
+        What `rater_progress` returned.
+
+    Returns
+    -------
+    list of SessionProgress
+        In their order; those of raters who are withdrawn or excluded are not there.
+    """
+    absent = {r.rater for r in raters if r.status in ("withdrawn", "excluded")}
+    return [s for s in sessions if s.stage != "complete" and s.rater not in absent]
+
+
+def _step(study: StudyPaths, verb: str, why: str, options: str = "") -> NextStep:
+    command = f"masrel {verb} {shlex.quote(str(study.root))}{options}"
+    return NextStep(command=command, why=why, verb=verb.split()[-1])
 
 
 def _to_run(
-    root: str, session: SessionProgress, sessions: Sequence[SessionProgress]
+    study: StudyPaths, session: SessionProgress, sessions: Sequence[SessionProgress]
 ) -> NextStep:
-    # by the way of the session, or of the rater's last one
-    place = f"--rater {session.rater} --session {session.session}"
-    ways = [each.grades_from for each in sessions if each.rater == session.rater]
-    way = session.grades_from or next(filter(None, reversed(ways)), None)
-    verb, command = "run", f"masrel run {root} {place}"
-    if way == FROM_PAPER and 0 < session.n_presented < session.n_presentations:
-        command = f"{command} --grades paper"
-    elif way == FROM_PAPER:
-        verb, command = "enter", f"masrel paper enter {root} FILE {place} --who WHO"
+    # by the way of the session, or of the rater's last one, or of somebody else's
+    typed = study.typed_file(session.rater, session.session)
+    others_first = sorted(sessions, key=lambda each: each.rater == session.rater)
+    ways = [each.grades_from for each in (session, *reversed(others_first))]
+    way = next(filter(None, ways), None)
+    verb, options = "run", f" --rater {session.rater} --session {session.session}"
+    if way == FROM_PAPER or (session.clock is None and typed.exists()):
+        verb, what = _on_paper(typed, session, sessions)
+        options = what + options
     elif way == "browser":
-        verb, command = "serve", f"masrel serve {root}"
-    return NextStep(
-        command=command,
-        why=f"{session.n_graded} of {session.n_presentations} graded",
-        verb=verb,
-        rater=session.rater,
-        session=session.session,
-    )
+        verb, options = "serve", ""
+    why = f"{session.n_graded} of {session.n_presentations} graded"
+    step = _step(study, verb, why, options)
+    return replace(step, rater=session.rater, session=session.session)
 
 
-def _to_await(root: str, open_: Sequence[SessionProgress]) -> NextStep | None:
+def _on_paper(
+    typed: Path, session: SessionProgress, sessions: Sequence[SessionProgress]
+) -> tuple[str, str]:
+    # A sheet is printed, models are presented by masrel or by another program, as
+    # those of other sheets were, and what was typed is entered.
+    from masrel.lab.paper._form import has_answers  # loads numpy
+
+    clock, n_left = session.clock, session.n_presentations - session.n_presented
+    if clock is None:
+        if not typed.exists():
+            return "paper print", ""
+        clocks = [each.clock for each in sessions if each.grades_from == FROM_PAPER]
+        clock = NO_DEVICE if has_answers(typed) or NO_DEVICE in clocks else "real"
+    if clock != NO_DEVICE and n_left:
+        return "run", " --grades paper"
+    file = shlex.quote(str(typed)) if typed.exists() else "FILE"
+    return "paper enter", f" {file} --who WHO"
+
+
+def _to_await(study: StudyPaths, open_: Sequence[SessionProgress]) -> NextStep | None:
     # what begins on another day is asked for then; what is overdue, never
-    coming = [s for s in open_ if s.due_from is not None and not s.is_overdue]
+    coming = [s for s in open_ if s.due.first is not None and not s.due.is_overdue]
     if not coming:
         return None
-    session = min(coming, key=lambda each: str(each.due_from))
-    why = f"{session.rater} begins session {session.session} from {session.due_from} on"
-    return _of_study("status", root, why)
+    session = min(coming, key=lambda each: str(each.due.first))
+    what = f"{session.rater} begins session {session.session}"
+    return _step(study, "status", f"{what} from {session.due.first} on")
 
 
-def _to_make(study: StudyPaths, root: str) -> NextStep:
+def _to_make(
+    study: StudyPaths, sessions: Sequence[SessionProgress], n_open: int
+) -> NextStep:
     # of sessions that are complete: each output is made after what it is made of
+    done = "all sessions are complete"
+    if n_open:
+        done = f"{n_open} of {len(sessions)} sessions cannot begin any more"
+    elif (secret := find_secret(study)) is not None and secret.site is None:
+        places = [(each.rater, each.session) for each in sessions]
+        drawn = _read_drawn(study, places, skips_damaged=True)
+        if any(schedule.is_closed for _, schedule in drawn):
+            how, done = " --all --who WHO --why WHY", f"{done}, and sealed"
+            return _step(study, "record unblind", done, how)
     logs = [*study.logs(), *study.conduct_logs()]
     manifest = study.report / MANIFEST
     newest = max((log.stat().st_mtime_ns for log in logs), default=0)
     for verb, file in (("ratings", study.ratings_file), ("report", manifest)):
         made = file.stat().st_mtime_ns if file.exists() else -1
         if made < newest:
-            why = f"all sessions are complete; {file.name} is "
+            why = f"{done}; {file.name} is "
             why += "not there yet" if made < 0 else "older than the logs"
-            return _of_study(verb, root, why)
-    why = "all sessions are complete, and their report is written"
-    return _of_study("verify", root, why)
+            return _step(study, verb, why)
+    return _step(study, "verify", f"{done}, and the report is written")
+
+
+def study_status(study: StudyPaths, protocol: Protocol) -> dict[str, Any]:
+    """Say where a study stands, as ``masrel status`` writes it as JSON.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    dict
+        Its sessions and raters, what happened beside them, what has changed in the
+        plan, why a log of these cannot be read or None, and the next step.
+
+    Raises
+    ------
+    ScheduleError
+        If the file of the study's secret is damaged.
+    OSError
+        If a log that is there cannot be read.
+    """
+    sessions = session_progress(study, protocol)
+    raters: tuple[RaterProgress, ...] = ()
+    events: tuple[Event, ...] = ()
+    changes: tuple[PlanChange, ...] = ()
+    problem = None
+    try:
+        raters = rater_progress(study, protocol, sessions)
+        events, changes = read_conduct(study), plan_changes(study, protocol)
+    except MasrelError as error:  # hides no session
+        problem = str(error)
+    return {
+        "study": protocol.study.id,
+        "sessions": [asdict(session) for session in sessions],
+        "raters": [
+            {"rater": r.rater, "status": r.status, "is_late": r.is_late} for r in raters
+        ],
+        "events": [
+            {"event": e.kind, "time_utc": e.time_utc, **e.fields} for e in events
+        ],
+        "plan_changes": [asdict(change) for change in changes],
+        "problem": problem,
+        "next": asdict(next_step(study, sessions, raters, changes)),
+    }

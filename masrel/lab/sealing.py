@@ -1,30 +1,27 @@
-"""Sealed studies: who met which model stays unknown until every session is over.
+"""Sealed studies: which models were met stays unknown until every session is over.
 
 Where one account holds the secret this stops curiosity, not intent.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from datetime import datetime
-from typing import TYPE_CHECKING
-
-import msgspec
 
 from masrel._files import write_files
 from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._event_log import utc_now
-from masrel.lab.conduct import read_conduct, record_unblinding
-from masrel.lab.progress import rater_progress, session_progress
+from masrel.lab.conduct._study_log import (
+    append_event,
+    events_of_logs,
+    recover_conduct,
+    stated,
+)
+from masrel.lab.progress import open_sessions, rater_progress, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.protocol.definition import Analysis
-from masrel.lab.schedule.presentation import _SEALED, _read_drawn, _schedule_text
+from masrel.lab.schedule.presentation import _read_drawn, _schedule_text
 from masrel.lab.schedule.sheets import _open_schedule
 
-if TYPE_CHECKING:
-    from masrel.lab.ratings import Ratings  # loads numpy
-
-__all__ = ["as_far_as_known", "is_sealed", "unseal_study"]
+__all__ = ["is_sealed", "unseal_study"]
 
 
 def is_sealed(study: StudyPaths, protocol: Protocol) -> bool:
@@ -35,7 +32,7 @@ def is_sealed(study: StudyPaths, protocol: Protocol) -> bool:
     study : StudyPaths
         Where the study is.
     protocol : Protocol
-        The study's protocol.
+        The study's protocol; what it says of sealing is for schedules to come.
 
     Returns
     -------
@@ -44,30 +41,6 @@ def is_sealed(study: StudyPaths, protocol: Protocol) -> bool:
     """
     drawn = _read_drawn(study, protocol.rater_sessions, skips_damaged=True)
     return any(schedule.is_closed for _, schedule in drawn)
-
-
-def as_far_as_known(
-    protocol: Protocol, ratings: "Ratings"
-) -> "tuple[Protocol, Ratings]":
-    """Return what a report can be made of: of sealed ratings no plan and no rating.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study's protocol.
-    ratings : Ratings
-        Its ratings.
-
-    Returns
-    -------
-    tuple of Protocol and Ratings
-        These, or what is left of them where they say no models.
-    """
-    if all(row.model != _SEALED for row in ratings.rows):
-        return protocol, ratings
-    report = msgspec.structs.replace(protocol.report, gates=())
-    planless = msgspec.structs.replace(protocol, analysis=Analysis(), report=report)
-    return planless, replace(ratings, rows=())
 
 
 def unseal_study(
@@ -86,7 +59,8 @@ def unseal_study(
     Parameters
     ----------
     study : StudyPaths
-        Where the study is, with its secret.
+        Where the study is, with its secret. The copy of a site is opened once the
+        sessions of the site are over.
     protocol : Protocol
         The study's protocol.
     who, why : str
@@ -97,7 +71,7 @@ def unseal_study(
     Returns
     -------
     int
-        How many schedules are open now.
+        How many sealed schedules are open now; 0 of a study that has none.
 
     Raises
     ------
@@ -111,30 +85,31 @@ def unseal_study(
     OSError
         If a file cannot be written.
     """
+    reasons = stated(who=who, why=why)
+    drawn = [each for _, each in _read_drawn(study, protocol.rater_sessions)]
+    if not (sealed := [each for each in drawn if each.sealed]):
+        return 0
+    recover_conduct(study)
     sessions = session_progress(study, protocol)
-    absent = {
-        each.rater
-        for each in rater_progress(study, protocol, sessions)
-        if each.status in ("withdrawn", "excluded")
-    }
-    going_on = [
-        f"{each.rater} in session {each.session}"
-        for each in sessions
-        if each.stage != "complete" and each.rater not in absent
-    ]
+    going_on = open_sessions(sessions, rater_progress(study, protocol, sessions))
     if going_on:
+        names = listed(f"{each.rater} in session {each.session}" for each in going_on)
         raise ParameterError(
             "study: needed every session complete or its rater withdrawn, "
-            f"{listed(going_on)} {'is' if len(going_on) == 1 else 'are'} not"
+            f"{names} {'is' if len(going_on) == 1 else 'are'} not"
         )
+    opened = [_open_schedule(study, protocol, each) for each in sealed]
     texts = {
-        study.opened_file(each.rater, each.session): _schedule_text(
-            _open_schedule(study, protocol, each)
-        )
-        for _, each in _read_drawn(study, protocol.rater_sessions)
+        study.opened_file(each.rater, each.session): _schedule_text(each)
+        for each in opened
     }
-    request = {"rater": None, "session": None, "code": None, "who": who, "why": why}
-    if not any(dict(event.fields) == request for event in read_conduct(study)):
-        record_unblinding(study, protocol, None, who=who, why=why, now=now)
+    request = {"rater": None, "session": None, "code": None, **reasons}
+    # what is drawn later is opened by another event
+    is_recorded = False
+    for _, event in events_of_logs(study):
+        is_asked = event.kind == "unblinded" and dict(event.fields) == request
+        is_recorded = event.kind != "drawn" and (is_recorded or is_asked)
+    if not is_recorded:
+        append_event(study, protocol, "unblinded", request, now=now)
     write_files(texts, within=study.root)
-    return len(texts)
+    return len(sealed)

@@ -6,6 +6,7 @@ A page is a test case. ``python -m docs.make.pages PAGE`` writes what it prints 
 import ast
 import difflib
 import tomllib
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -32,7 +33,6 @@ SLOW = {
     "docs/agreement/command_line.md",
     "docs/ci.md",
     "docs/conduct.md",
-    "docs/coordinating.md",
     "docs/gallery.md",
     "docs/hardware.md",
     "docs/identification.md",
@@ -41,6 +41,9 @@ SLOW = {
     "docs/report.md",
     "docs/training.md",
 }
+
+# Whose files are looked at, too, by tests/lab/flow/test_coordinated_study.py.
+RUN_ELSEWHERE = {"docs/coordinating.md"}
 
 # Every block that is not run, and why. A new one has to be entered here.
 NOT_RUN = [
@@ -84,10 +87,16 @@ PIECES = {
     [
         pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else [])
         for name in PAGES
+        if name not in RUN_ELSEWHERE
     ],
 )
 def test_a_page_shows_what_it_prints(name: str) -> None:
-    page, now = TEXTS[name], renewed(TEXTS[name], name)
+    hold_page(name)
+
+
+def hold_page(name: str, folder: Path | None = None) -> None:
+    """Hold a page against what it prints now, and keep its files in a folder."""
+    page, now = TEXTS[name], renewed(TEXTS[name], name, folder)
     if page != now:
         changes = difflib.unified_diff(
             page.splitlines(), now.splitlines(), name, "printed now", lineterm=""
@@ -180,6 +189,8 @@ def test_a_command_reads_the_file_that_the_page_shows() -> None:
         (["..."], ["..."]),
         ([], ["a", "b", "c"]),
         (["a", "c"], ["a", "b", "c"]),
+        (["a", "…", "…c"], ["a", "…", "…c"]),
+        (["…", "b"], ["a", "b", "c"]),
     ],
 )
 def test_three_dots_stand_for_lines_of_output(
@@ -187,6 +198,12 @@ def test_three_dots_stand_for_lines_of_output(
 ) -> None:
     command = "$ python -c \"print('a', 'b', 'c', sep='\\n')\""
     assert renewed(page(console(command, *shown))) == page(console(command, *right))
+
+
+def test_a_module_takes_the_place_of_a_block() -> None:
+    marker = "<!-- instead: zipfile -c a.txt studies -->\n"
+    shown = marker + console("$ masrel serve nowhere", "...")
+    assert renewed(text := page(shown, console("$ ls a.txt", "a.txt"))) == text
 
 
 def test_what_is_typed_is_seen_at_the_prompt() -> None:

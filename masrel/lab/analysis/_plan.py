@@ -26,6 +26,7 @@ from masrel.lab.analysis._descriptions import (
     stretching_speeds,
 )
 from masrel.lab.analysis._results import Analysis, PlannedEstimate, RaterEstimate
+from masrel.lab.conduct import PlanChange
 from masrel.lab.protocol import (
     EstimatePlan,
     Protocol,
@@ -44,6 +45,8 @@ from masrel.lab.ratings import (
     retest_pairs,
 )
 
+_SEALED_STILL = "which models were met is sealed"
+
 
 def analyze(
     protocol: Protocol,
@@ -52,6 +55,7 @@ def analyze(
     in_person: InPerson | None = None,
     answers: Sequence[GivenAnswer] = (),
     excluded: Sequence[str] = (),
+    changes: Sequence[PlanChange] = (),
 ) -> Analysis:
     """Compute what the protocol's plan and report ask for.
 
@@ -70,12 +74,16 @@ def analyze(
         Raters who are left out of every number
         (`masrel.lab.conduct.excluded_raters`). The hashes of the inputs are of all
         ratings.
+    changes : sequence of PlanChange, optional
+        What has changed in the plan since it was drawn
+        (`masrel.lab.conduct.plan_changes`), which is said beside the numbers.
 
     Returns
     -------
     Analysis
         One entry per line of the plan; a line whose data are absent has a reason
-        instead of an estimate. Parts no section asks for are None.
+        instead of an estimate, of sealed ratings each. Parts no section asks for are
+        None.
 
     Raises
     ------
@@ -93,15 +101,17 @@ def analyze(
     SmallSampleWarning
         If an interval rests on too little data.
     """
-    _check_known(protocol, ratings)
     inputs = _inputs(protocol, ratings, in_person, answers)
+    is_sealed, sections = ratings.is_sealed, set(report_sections(protocol))
+    if is_sealed:  # nothing of them could be said without a model
+        ratings, answers, sections = replace(ratings, rows=()), (), set()
+    _check_known(protocol, ratings)
     if excluded:
         ratings = ratings.without(excluded)
         if in_person is not None:
             rows = tuple(row for row in in_person.rows if row.rater not in excluded)
             in_person = replace(in_person, rows=rows)
         answers = [each for each in answers if each.rater not in excluded]
-    sections = set(report_sections(protocol))
     # descriptions of grades speak of the first session that has ratings
     present = {row.session for row in ratings.rows}
     session = next((s.id for s in protocol.sessions if s.id in present), None)
@@ -109,7 +119,10 @@ def analyze(
         study=protocol.study.id,
         level=protocol.analysis.level,
         estimates=tuple(
-            _estimate(line, protocol, ratings) for line in protocol.analysis.estimates
+            PlannedEstimate(line=line, reason=_SEALED_STILL)
+            if is_sealed
+            else _estimate(line, protocol, ratings)
+            for line in protocol.analysis.estimates
         ),
         intended=(
             intended_agreement(protocol, ratings, session)
@@ -130,6 +143,15 @@ def analyze(
         questionnaires=question_summaries(protocol, answers),
         simulated=ratings.simulated,
         excluded=tuple(excluded),
+        plan_changes=tuple(  # who changed it, and why, is not for everybody
+            {
+                "key": change.key,
+                "before": change.before,
+                "after": change.after,
+                "time_utc": change.time_utc,
+            }
+            for change in changes
+        ),
         inputs=inputs,
         masrel_version=masrel.__version__,
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from masrel._files import write_file
+from masrel._files import usual_mode, write_file
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, as_document
 from masrel.lab.protocol import EstimatePlan
@@ -349,6 +349,9 @@ class Analysis:
         Whether any rating is simulated.
     excluded : tuple of str
         Raters who are left out of every number.
+    plan_changes : tuple of mapping of str to (str or None)
+        What has changed in the plan since it was drawn: ``key``, ``before`` and
+        ``after`` as JSON, and when that was recorded, ``time_utc``.
     inputs : mapping of str to str
         SHA-256 of every input, by name.
     masrel_version : str
@@ -365,6 +368,7 @@ class Analysis:
     questionnaires: tuple[QuestionSummary, ...]
     simulated: bool
     excluded: tuple[str, ...] = ()
+    plan_changes: tuple[Mapping[str, str | None], ...] = ()
     inputs: Mapping[str, str]
     masrel_version: str
 
@@ -374,7 +378,7 @@ ANALYSIS_FORMAT = 1
 
 
 # Fields that analyses once had not, and have not in a file where they are empty
-_LATER = ("excluded", "questionnaires")
+_LATER = ("excluded", "plan_changes", "questionnaires")
 
 
 def as_analysis_document(analysis: Analysis) -> dict[str, object]:
@@ -388,9 +392,9 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
     Returns
     -------
     dict
-        The version of its format, and its fields in order, `excluded` and
-        `questionnaires` only where there are some; every part carries the hashes of its
-        inputs.
+        The version of its format, and its fields in order, `excluded`, `plan_changes`
+        and `questionnaires` only where there are some; every part carries the hashes of
+        its inputs.
     """
     document: dict[str, object] = {"format": ANALYSIS_FORMAT}
     for field in dataclasses.fields(analysis):
@@ -405,7 +409,11 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
 
 
 def write_analysis(
-    analysis: Analysis, path: Path, *, within: Path | None = None
+    analysis: Analysis,
+    path: Path,
+    *,
+    within: Path | None = None,
+    is_private: bool = False,
 ) -> None:
     """Write an analysis as JSON; the same analysis gives the same bytes.
 
@@ -417,6 +425,8 @@ def write_analysis(
         The file.
     within : Path, optional
         A folder that the file may not leave by a link, such as the study's.
+    is_private : bool, optional
+        Whether it is its owner's alone, as of a study that goes on.
 
     Raises
     ------
@@ -425,7 +435,8 @@ def write_analysis(
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    write_file(path, analysis_text(analysis), within=within)
+    mode = 0o600 if is_private else usual_mode(0o666)
+    write_file(path, analysis_text(analysis), within=within, mode=mode)
 
 
 def analysis_text(analysis: Analysis) -> str:

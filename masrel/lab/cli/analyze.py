@@ -41,6 +41,7 @@ def analyze(
     Prints the tables and writes STUDY/analysis.json, or the file of --json.
     """
     from masrel.lab import analysis as library
+    from masrel.lab.report import study_conduct
 
     data = read_study(study, ratings_file)
     gates = gating.gates(data.protocol)
@@ -51,14 +52,19 @@ def analyze(
             in_person=data.in_person,
             answers=data.answers,
             excluded=data.excluded,
+            changes=data.changes,
         )
     if output.json_file == STDOUT:
         write_json(library.as_analysis_document(analysis), STDOUT)
         conclude(verdict_of(analysis, gates), gating)
         return
     destination = output.json_file or data.paths.analysis_file
+    conduct = study_conduct(data.paths, data.protocol, file=ratings_file)
     library.write_analysis(
-        analysis, destination, within=None if output.json_file else study
+        analysis,
+        destination,
+        within=None if output.json_file else study,
+        is_private=conduct is not None and conduct.goes_on,
     )
     _show(data, analysis, csv=bool(output.csv), raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from masrel.errors import MasrelError, ParameterError, ProtocolError, RatingsError
+from masrel.errors import MasrelError, ParameterError, ProtocolError
 from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import echo_remarks, study_argument
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
@@ -100,25 +100,20 @@ def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    files = [f for f in (study.ratings_file, study.published_file) if f.exists()]
-    if not files:
-        return
-    from masrel.lab.ratings import ratings_from_logs, read_study_ratings
-    from masrel.lab.ratings.study_data import _refuse_other_table
+    from masrel.lab.ratings import read_study_ratings
+    from masrel.lab.ratings.study_data import _table_problem
 
-    for path in files:
+    for path in (study.ratings_file, study.published_file):
         try:
-            read_study_ratings(path, scale_of(protocol))
+            if path.exists():
+                read_study_ratings(path, scale_of(protocol))
         except MasrelError as error:
             yield str(error)
             return
-    if study.ratings_file.exists() and study.logs():
-        with contextlib.suppress(MasrelError):  # what of the logs, another has said
-            ratings = ratings_from_logs(study, protocol, check_recordings=False)
-            try:
-                _refuse_other_table(study.ratings_file, ratings)
-            except RatingsError as error:
-                yield str(error)
+    with contextlib.suppress(MasrelError):  # what of the logs, another has said
+        is_stale, problem = _table_problem(study, protocol)
+        if problem and not is_stale:
+            yield problem
 
 
 _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (

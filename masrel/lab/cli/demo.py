@@ -13,6 +13,9 @@ from masrel.errors import MasrelWarning, ParameterError
 from masrel.lab.cli._study_options import read_study
 from masrel.lab.protocol import Protocol, StudyPaths, copy_template, read_protocol
 
+# Of what is in the log of the study: the same each time, as reports have it
+_DAY = datetime(2012, 1, 1, tzinfo=UTC)
+
 
 @click.command("demo")
 @click.argument("out", type=click.Path(path_type=Path))
@@ -74,7 +77,7 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
     from masrel.lab.run import SimulatedGrades, run_session
 
     protocol = read_protocol(study.protocol)
-    allot_schedules(study, protocol)
+    allot_schedules(study, protocol, now=lambda: _DAY)
     occasions = protocol.rater_sessions
     n_presentations = len(occasions) * len(protocol.models) * protocol.schedule.repeats
     with tqdm(
@@ -100,7 +103,7 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
 
 
 def _record_event(study: StudyPaths, protocol: Protocol) -> None:
-    # as a coordinator does; on a day that is the same each time, as the report has it
+    # as a coordinator does
     from masrel.lab.conduct import Note, record_note
 
     record_note(
@@ -116,7 +119,7 @@ def _record_event(study: StudyPaths, protocol: Protocol) -> None:
             rater=protocol.raters[0].id,
             session=protocol.sessions[0].id,
         ),
-        now=lambda: datetime(2012, 1, 1, tzinfo=UTC),
+        now=lambda: _DAY,
     )
 
 

@@ -1,6 +1,5 @@
 """``masrel paper``: sheets to print, and those that were filled in, into logs."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,7 +70,7 @@ _sheet_options = several(
 @_sheet_options
 @click.option(
     "--on",
-    type=click.DateTime(["%Y-%m-%d"]),
+    metavar="DATE",
     help="Day of the session, as on the sheet.",
 )
 @click.option("--device", help="What presented the models; default: none.")
@@ -82,7 +81,7 @@ def _enter(
     rater: str,
     session: str,
     who: str,
-    on: datetime | None,
+    on: str | None,
     device: str | None,
 ) -> None:
     """Enter a sheet of STUDY that was filled in on paper and typed into FILE.
@@ -90,7 +89,7 @@ def _enter(
     All of it enters the session's log, or nothing where a row is wrong.
     """
     from masrel.lab.paper import enter_sheet
-    from masrel.lab.paper._entry import NO_DEVICE
+    from masrel.lab.run._state import NO_DEVICE
 
     with warnings_as_notes():
         entered = enter_sheet(
@@ -100,7 +99,7 @@ def _enter(
             rater,
             session,
             who=who,
-            on=None if on is None else on.date(),
+            on=on,
             device=device or NO_DEVICE,
         )
     n_graded = len(entered.grades)

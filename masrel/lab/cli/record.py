@@ -378,16 +378,15 @@ def _unblind(
     """
     from masrel.lab.conduct import record_unblinding
     from masrel.lab.protocol.study import _OPENED
-    from masrel.lab.sealing import is_sealed, unseal_study
+    from masrel.lab.sealing import unseal_study
 
     if (code is None) != every:
         raise click.UsageError("needs either a CODE or --all")
-    if every and is_sealed(study, protocol):
-        if fields.pop("rater") or fields.pop("session"):
-            raise click.UsageError("--all opens a sealed study as a whole")
-        n = unseal_study(study, protocol, **fields)
-        click.echo(f"{n} schedules are open: {study.schedules / _OPENED}")
-        return
+    if every and not (fields["rater"] or fields["session"]):
+        reasons = {key: fields[key] for key in ("who", "why")}
+        if n := unseal_study(study, protocol, **reasons):
+            click.echo(f"{n} schedules are open: {study.schedules / _OPENED}")
+            return
     for schedule, shown in record_unblinding(study, protocol, code, **fields):
         click.echo(
             f"{shown.code} of {schedule.rater}, session {schedule.session}, is "

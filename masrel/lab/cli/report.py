@@ -286,22 +286,20 @@ def _made(
     from masrel.lab.report._document import make_report, section_names
     from masrel.lab.report._material import gather
     from masrel.lab.report._pages import CONVERTED, pandoc_version
-    from masrel.lab.sealing import as_far_as_known
     from masrel.lab.verification import anchors_of
 
     # most of what libraries and figures make stays in use
     with read_once(), collector_off():
         data = read_study(study, ratings_file, allows_sealed=True)
-        protocol, ratings = as_far_as_known(data.protocol, data.ratings)
-        if protocol is not data.protocol:  # how far it is, and no model
-            only = ("flow", "conduct")
+        protocol, ratings = data.protocol, data.ratings
+        known = section_names(protocol, is_sealed=ratings.is_sealed)
         for name in only:
-            check_option("--only", name, section_names(protocol))
-        if CONVERTED & {*data.protocol.report.formats, *formats}:
+            check_option("--only", name, known)
+        if CONVERTED & {*protocol.report.formats, *formats}:
             pandoc_version()
         gates = gating.gates(protocol)
         conduct = study_conduct(
-            data.paths, data.protocol, file=ratings_file, include=include
+            data.paths, protocol, file=ratings_file, include=include
         )
         with warnings_as_notes():
             analysis = analyze(
@@ -310,6 +308,7 @@ def _made(
                 in_person=data.in_person,
                 answers=data.answers,
                 excluded=data.excluded,
+                changes=data.changes,
             )
         in_person, folder = data.in_person, data.paths.sessions
         material = gather(protocol, ratings, analysis, in_person, folder, conduct)
@@ -323,7 +322,7 @@ def _made(
             files = make_report(
                 material,
                 # of what is simulated none, so that it repeats byte for byte
-                anchors=() if data.ratings.simulated else anchors_of(data.paths),
+                anchors=() if ratings.simulated else anchors_of(data.paths),
                 progress=progress,
                 raw_csv=output.raw_csv,
                 only=only,

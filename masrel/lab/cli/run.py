@@ -73,9 +73,11 @@ def run(
             progress=lambda _: bar.update(),
         )
     if not output.quiet and grades == "paper":
+        typed = paths.typed_file(rater, session)
         click.echo(
             f"session {session} of {rater} is presented. Next: masrel paper enter "
-            f"{paths.root} FILE --rater {rater} --session {session} --who WHO"
+            f"{paths.root} {typed if typed.exists() else 'FILE'} --rater {rater} "
+            f"--session {session} --who WHO"
         )
     elif not output.quiet:
         click.echo(_completed(done, grades))

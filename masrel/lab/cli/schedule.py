@@ -48,6 +48,7 @@ def _show(
         text=lambda: summary_table(balances),
         figure=lambda: Drawn(FIGURES + "_study_figures:order_pictures", (balances,)),
         stamp="not for raters",
+        mode=0o600,
         more=[table for balance in balances for table in count_tables(balance)],
     )
 
@@ -92,12 +93,14 @@ def _draw(
     from masrel.lab.conduct import allot_schedules
     from masrel.lab.schedule import site_of_copy
     from masrel.lab.schedule._secret import rater_sessions_at
+    from masrel.lab.sealing import is_sealed
 
     site = site or site_of_copy(paths)
     written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))
     places = rater_sessions_at(protocol, site)
     n_new = sum(paths.schedule_file(*place) in written for place in places)
+    others = "are sealed" if is_sealed(paths, protocol) else "name the models"
     click.echo(
         f"{paths.schedules}: {n_new} drawn, {len(places) - n_new} kept. Give raters "
-        "the files that end in _sheet.csv; the others name the models."
+        f"the files that end in _sheet.csv; the others {others}."
     )

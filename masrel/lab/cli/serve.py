@@ -9,6 +9,7 @@ import click
 
 from masrel.errors import ParameterError
 from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.protocol.content import _refuse_unknown_coefficients
 
 if TYPE_CHECKING:
     from masrel.lab.serve._access import Access
@@ -65,7 +66,7 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
     from masrel.lab.serve._manager import SessionManager
 
     paths = StudyPaths(study)
-    read_protocol(paths.protocol)
+    _refuse_unknown_coefficients(read_protocol(paths.protocol), paths.protocol)
     context = None if tls is None else _server.encryption(*tls)
     with _server.alone(paths), _server.listen(host, port) as listener:
         names = _server.hosts(listener, host, encrypted=tls is not None)

@@ -1,7 +1,5 @@
 """``masrel status``: how far a study is, and what to do next."""
 
-from collections.abc import Sequence
-from dataclasses import asdict
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
@@ -9,13 +7,10 @@ import click
 
 from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
-from masrel.errors import SessionLogError
 from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import of_study
 
 if TYPE_CHECKING:
-    from masrel.lab._event_log import Event
-    from masrel.lab.progress import RaterProgress, SessionProgress
     from masrel.lab.protocol import Protocol, StudyPaths
     from masrel.tables._tables import Table
 
@@ -38,44 +33,26 @@ def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> 
     By the logs alone, whose chains are verified; no recording is read, nothing is
     changed, and no model is named.
     """
-    from masrel.lab.conduct import read_conduct
-    from masrel.lab.progress import next_step, rater_progress, session_progress
+    from masrel.lab.conduct import PlanChange
+    from masrel.lab.progress import study_status
     from masrel.tables._tables import as_text
 
-    sessions = session_progress(paths, protocol)
-    raters: tuple[RaterProgress, ...] = ()
-    events: tuple[Event, ...] = ()
-    problem = None  # why what happened beside the sessions cannot be read
-    try:
-        raters = rater_progress(paths, protocol, sessions)
-        events = read_conduct(paths)
-    except SessionLogError as error:  # hides no session
-        problem = str(error)
-    step = next_step(paths, sessions, raters)
-    problems = (problem, *(session.problem for session in sessions))
+    stands = study_status(paths, protocol)
+    sessions = stands["sessions"]
+    problems = (stands["problem"], *(session["problem"] for session in sessions))
+    parts = (
+        *(each for each in problems if each is not None),
+        "\n".join(map(_event_line, stands["events"])),
+        "\n".join(str(PlanChange(**each)) for each in stands["plan_changes"]),
+        "next: {command}  ({why})".format(**stands["next"]),
+    )
     write_output(
         output,
-        document=lambda: {
-            "study": protocol.study.id,
-            "sessions": [asdict(session) for session in sessions],
-            "raters": [
-                {"rater": r.rater, "status": r.status, "is_late": r.is_late}
-                for r in raters
-            ],
-            "events": [
-                {"event": e.kind, "time_utc": e.time_utc, **e.fields} for e in events
-            ],
-            "problem": problem,
-            "next": asdict(step),
-        },
+        document=lambda: stands,
         text=lambda: "\n\n".join(
-            [
-                as_text(_sessions_table(protocol.study.id, sessions, raters)),
-                *(each for each in problems if each is not None),
-                *(["\n".join(map(_event_line, events))] if events else []),
-                f"next: {step.command}  ({step.why})",
-            ]
+            [as_text(_sessions_table(stands)), *filter(None, parts)]
         ),
+        mode=0o600,
     )
 
 
@@ -92,40 +69,38 @@ _COUNTS = {
 }
 
 
-def _sessions_table(
-    study: str,
-    sessions: "Sequence[SessionProgress]",
-    raters: "Sequence[RaterProgress]",
-) -> "Table":
+def _sessions_table(stands: dict[str, Any]) -> "Table":
     from masrel.tables._tables import Column, table_of
 
     absent = {
-        r.rater: f", {r.status}"
-        for r in raters
-        if r.status in ("withdrawn", "excluded")
+        rater["rater"]: f", {rater['status']}"
+        for rater in stands["raters"]
+        if rater["status"] in ("withdrawn", "excluded")
     }
+    sessions = stands["sessions"]
     rows = [
         {
-            **asdict(each),
-            "stage": each.stage + absent.get(each.rater, ""),
-            "graded": f"{each.n_graded} of {each.n_presentations}",
-            "due": _due(each),
-            "last": each.last_time_utc
-            and f"{_minute(each.last_time_utc)} {each.last_event}",
+            **each,
+            "stage": each["stage"] + absent.get(each["rater"], ""),
+            "graded": "{n_graded} of {n_presentations}".format(**each),
+            "day": each["held_on"]
+            or (_due(**each["due"]) if each["rater"] not in absent else None),
+            "last": each["last_time_utc"]
+            and f"{_minute(each['last_time_utc'])} {each['last_event']}",
         }
         for each in sessions
     ]
-    n_complete = sum(session.stage == "complete" for session in sessions)
+    n_complete = sum(session["stage"] == "complete" for session in sessions)
     return table_of(
         "status",
-        f"Study {study}: {n_complete} of {len(sessions)} sessions complete",
+        f"Study {stands['study']}: {n_complete} of {len(sessions)} sessions complete",
         (
             Column(key="session", heading="Session", align="left"),
             Column(key="rater", heading="Rater", align="left"),
             Column(key="stage", heading="Stage", align="left"),
             Column(key="graded", heading="Graded"),
-            *[Column(key="due", heading="Due", align="left")]
-            * any(row["due"] for row in rows),
+            *[Column(key="day", heading="Day", align="left")]
+            * any(row["day"] for row in rows),
             *(
                 Column(key=key, heading=heading)
                 for key, heading in _COUNTS.items()
@@ -134,29 +109,32 @@ def _sessions_table(
             Column(key="last", heading="Last event (UTC)", align="left"),
         ),
         rows,
-        data="simulated" if any(s.simulated for s in sessions) else "recorded",
+        data="simulated" if any(s["simulated"] for s in sessions) else "recorded",
     )
 
 
-def _due(session: "SessionProgress") -> str | None:
+def _due(
+    first: str | None, last: str | None, *, is_overdue: bool, **_: object
+) -> str | None:
     # the days on which it may begin
-    if session.due_from is None and session.due_to is None:
-        return None
-    first = f"from {session.due_from}" if session.due_from else ""
-    last = f"to {session.due_to}" if session.due_to else ""
-    overdue = ", overdue" if session.is_overdue else ""
-    return f"{first} {last}".strip() + overdue
+    words = (
+        f"from {first}" if first else None,
+        f"to {last}" if last else None,
+        "(overdue)" if is_overdue else None,
+    )
+    return " ".join(filter(None, words)) or None
 
 
-def _event_line(event: "Event") -> str:
-    fields = {name: value for name, value in event.fields.items() if value is not None}
-    kind = fields.pop("kind", event.kind)
+def _event_line(event: dict[str, Any]) -> str:
+    fields = {name: value for name, value in event.items() if value is not None}
+    time_utc, kind = fields.pop("time_utc"), fields.pop("event")
+    kind = fields.pop("kind", kind)
     # one line, whatever was written
     details = ", ".join(
         f"{name} {shorten(str(value), _MOST_SHOWN, placeholder=' …')}"
         for name, value in fields.items()
     )
-    return f"{_minute(event.time_utc)} {kind}: {details}"
+    return f"{_minute(time_utc)} {kind}: {details}"
 
 
 def _minute(time_utc: str) -> str:
@@ -191,6 +169,7 @@ def _raters(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) ->
         output,
         document=lambda: {"raters": rows},
         text=lambda: _raters_table(rows, protocol, simulated=simulated),
+        mode=0o600,
     )
 
 

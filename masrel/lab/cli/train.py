@@ -123,6 +123,8 @@ def _show(
         stamp=training_stamp(record, protocol.study.id),
         more=() if output.csv else (confusion,),
         width=_WIDTH,
+        mode=0o600,
     )
     if page is not None:
-        write_file(page, training_page(record, protocol, level=level))
+        text = training_page(record, protocol, level=level)
+        write_file(page, text, mode=0o600)

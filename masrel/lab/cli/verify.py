@@ -3,7 +3,7 @@
 import dataclasses
 import sys
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,7 +56,12 @@ def verify(
     tables, analysis and report. Prints how far each came, what is wrong, and an
     anchor for each log: a hash that, kept elsewhere, shows that its lines were not
     written anew.
-    Exit code 2 when something is broken.
+
+    A finding is broken, stale or a doubt. Broken is what no state of the record can
+    have been or made: exit code 2. Stale is what was made of an earlier state of the
+    record, or of something that no log keeps; the command that makes it anew is named:
+    exit code 1, where nothing is broken. A doubt may have an innocent reason: exit
+    code 0, as without findings.
     """
     from masrel.lab.verification import anchors_of, verify_study
 
@@ -70,14 +75,12 @@ def verify(
     if anchor_file is not None and anchor_file.exists():
         _say_stamp(anchor_file, stamp, authority)
     verification = dataclasses.replace(verification, findings=findings)
-    n_broken = sum(finding.weight == "broken" for finding in findings)
+    n: Counter[str] = Counter(finding.weight for finding in findings)
     if output.json_file is not None:
-        document = _document(verification, anchors, is_whole=not n_broken)
-        write_json(document, output.json_file)
+        write_json(_document(verification, anchors), output.json_file)
     if output.json_file != STDOUT:
-        _show(study, verification, anchors, n_broken)
-    if n_broken:
-        sys.exit(2)
+        _show(study, verification, anchors, n)
+    sys.exit(2 if n["broken"] else 1 if n["stale"] else 0)
 
 
 def _anchored(
@@ -122,9 +125,12 @@ def _say_stamp(file: Path, service: str | None, authority: Path | None) -> None:
 
 
 def _document(
-    verification: "Verification", anchors: "tuple[Anchor, ...]", *, is_whole: bool
+    verification: "Verification", anchors: "tuple[Anchor, ...]"
 ) -> dict[str, object]:
-    document = {"is_whole": is_whole, **dataclasses.asdict(verification)}
+    document = {
+        "is_whole": verification.is_whole,
+        **dataclasses.asdict(verification),
+    }
     for finding in document["findings"]:
         finding["path"] = str(finding["path"])
     return {**document, "anchors": [dataclasses.asdict(anchor) for anchor in anchors]}
@@ -152,7 +158,7 @@ def _show(
     study: Path,
     verification: "Verification",
     anchors: "tuple[Anchor, ...]",
-    n_broken: int,
+    n: Mapping[str, int],
 ) -> None:
     for record in (*verification.sessions, *verification.rehearsals):
         click.echo(_line_of(record, is_training=False))
@@ -162,10 +168,9 @@ def _show(
         click.echo(f"anchor: {anchor}")
     for finding in verification.findings:
         click.echo(f"{finding.weight}: {finding.message}", err=True)
-    n = Counter(finding.weight for finding in verification.findings)
-    doubts = f", {n['stale']} out of date" if n["stale"] else ""
-    doubts += f", {n['doubt']} in doubt" if n["doubt"] else ""
-    if n_broken:
-        click.echo(f"masrel: {study}: {n_broken} broken{doubts}", err=True)
+    weights = {"broken": "broken", "stale": "out of date", "doubt": "in doubt"}
+    counts = ", ".join(f"{n[key]} {text}" for key, text in weights.items() if n[key])
+    if n["broken"] or n["stale"]:
+        click.echo(f"masrel: {study}: {counts}", err=True)
     else:
-        click.echo(f"{study}: whole{doubts}.")
+        click.echo(f"{study}: whole{counts and ', '}{counts}.")

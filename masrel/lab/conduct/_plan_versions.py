@@ -5,26 +5,33 @@ Every draw and amendment leaves a copy of the protocol in the log of the study.
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import pairwise
+from itertools import chain, pairwise, takewhile
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 import masrel
-from masrel.errors import ParameterError
-from masrel.lab._event_log import Event, utc_now
+from masrel.errors import MasrelError, ParameterError, SessionLogError
+from masrel.lab._event_log import Event, timed_events, utc_now
+from masrel.lab._study_files import as_then
 from masrel.lab.conduct._study_log import (
     VERSIONS,
     events_of_logs,
     last_version,
     open_conduct,
+    recover_conduct,
     stated,
     version_of,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
-from masrel.lab.protocol.content import _content_differences
+from masrel.lab.protocol.content import _content_differences, _protocol_content
 from masrel.lab.schedule._secret import find_secret, new_secret
 
 # What decides what is rated, computed and required. The rest are words, or are held by
@@ -62,10 +69,10 @@ class PlanChange:
 
     def __str__(self) -> str:
         was, is_ = self.before or "not planned", self.after or "gone"
-        when = "and nobody has recorded it"
+        when = "nobody has recorded it"
         if self.time_utc is not None:
             when = f"recorded on {self.time_utc[:10]}"
-        return f"{self.key} was {was} at the draw and is {is_} since, {when}"
+        return f"Change of the plan: {self.key} was {was}, then {is_}; {when}"
 
 
 def plan_changes(study: StudyPaths, protocol: Protocol) -> tuple[PlanChange, ...]:
@@ -89,23 +96,83 @@ def plan_changes(study: StudyPaths, protocol: Protocol) -> tuple[PlanChange, ...
     SessionLogError
         If a log of the study is damaged.
     """
-    events = [event for _, event in events_of_logs(study) if event.kind in VERSIONS]
-    if not events:
-        return ()
-    contents = [_content(event.fields) for event in events]
-    contents.append(_content(version_of(protocol)))
+    contents: list[tuple[object, Event | None]] = [
+        (_content(then, str(event.fields["texts_sha256"])), event)
+        for then, event in plan_versions(study)
+    ]
+    contents.append((_content(protocol, version_of(protocol)["texts_sha256"]), None))
     return tuple(
         change
-        for (before, after), event in zip(
-            pairwise(contents), [*events[1:], None], strict=True
-        )
+        for (before, _), (after, event) in pairwise(contents)
         for change in _between(before, after, event)
     )
 
 
-def _content(version: Mapping[str, object]) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(str(version["protocol"]))
-    return {**content, "texts of the scale": version["texts_sha256"]}
+def _content(protocol: Protocol, texts_sha256: str) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(_protocol_content(protocol))
+    return {**content, "texts of the scale": texts_sha256}
+
+
+def plan_versions(study: StudyPaths) -> list[tuple[Protocol, Event]]:
+    """Return each protocol that was kept, that of the first draw first, with the event.
+
+    A copy that has not its hash, or is no protocol, is refused.
+    """
+    return [
+        (_copy_of(log, event), event)
+        for log, event in events_of_logs(study)
+        if event.kind in VERSIONS
+    ]
+
+
+def _copy_of(log: Path, event: Event) -> Protocol:
+    text, copy = str(event.fields["protocol"]).encode(), None
+    with suppress(msgspec.DecodeError):
+        copy = msgspec.json.decode(text, type=Protocol)
+    got, needed = hashlib.sha256(text).hexdigest(), event.fields["protocol_sha256"]
+    if copy is None or got != needed:
+        raise SessionLogError(
+            f"{log}: line {event.line}: {event.kind}: needed the protocol with SHA-256 "
+            f"{needed}, got {'another text' if copy is None else got}"
+        )
+    return copy
+
+
+def is_of_earlier(
+    study: StudyPaths, protocol: Protocol, is_made: Callable[[Protocol], bool | None]
+) -> bool:
+    """Say whether something was made of a state that the record had earlier.
+
+    `is_made` says so of a protocol, and of what logs say while it is called, the latest
+    first; None, that the record had too little by then, and so at any earlier time.
+    """
+
+    def answer(then: Protocol) -> bool | None:
+        with suppress(MasrelError):
+            return is_made(then)
+        return False
+
+    versions = {protocol_hash(each): each for each, _ in plan_versions(study)}
+    for then in ({protocol_hash(protocol): protocol} | versions).values():
+        answers = (as_then(lines, answer, then) for lines in _states(study, protocol))
+        if any(takewhile(lambda answer: answer is not None, answers)):
+            return True
+    return False
+
+
+def _states(study: StudyPaths, protocol: Protocol) -> Iterator[Mapping[str, int]]:
+    # how many lines logs have, and had before each event, the last one first
+    logs = map(timed_events, [*study.conduct_logs(), *study.logs()])
+    timed = sorted(chain(*logs), key=itemgetter(0))
+    n_lines = dict(Counter(str(log) for _, log, _ in timed))
+    yield n_lines
+    for _, log, event in reversed(timed):
+        n_lines[str(log)] -= 1
+        if event.kind == "unblinded":  # a sealed study was sealed before
+            n_lines |= {
+                str(study.schedule_file(*place)): 0 for place in protocol.rater_sessions
+            }
+        yield n_lines
 
 
 def _between(before: Any, after: Any, event: Event | None) -> Iterator[PlanChange]:
@@ -159,20 +226,6 @@ def registration(study: StudyPaths, protocol: Protocol) -> dict[str, object]:
     }
 
 
-def version_problems(study: StudyPaths) -> Iterator[tuple[Path, str]]:
-    """Yield where a log keeps another protocol than that whose hash it has."""
-    for log, event in events_of_logs(study):
-        if event.kind in VERSIONS:
-            text = str(event.fields["protocol"]).encode()
-            sha256, got = event.fields["protocol_sha256"], hashlib.sha256(text)
-            if got.hexdigest() != sha256:
-                yield (
-                    log,
-                    f"line {event.line}: {event.kind}: needed the protocol with "
-                    f"SHA-256 {sha256}, got one with {got.hexdigest()}",
-                )
-
-
 def record_amendment(
     study: StudyPaths,
     protocol: Protocol,
@@ -210,6 +263,7 @@ def record_amendment(
         If it cannot be written.
     """
     reasons = stated(who=who, why=why)
+    recover_conduct(study)
     before = last_version(event for _, event in events_of_logs(study))
     if before is None:
         raise ParameterError(

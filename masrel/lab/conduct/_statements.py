@@ -17,6 +17,7 @@ from masrel.lab.conduct._study_log import (
     open_conduct,
     past_day,
     read_conduct,
+    recover_conduct,
     stated,
 )
 from masrel.lab.protocol import Protocol, RaterField, StudyPaths
@@ -369,6 +370,7 @@ def record_standing(
     """
     check_rater(protocol, rater)
     check_choice("standing", standing, get_args(Standing))
+    recover_conduct(study)
     is_excluded = rater in excluded_raters(study)
     if standing == "withdrawn":
         refuse_withdrawn(study, rater)
@@ -418,8 +420,7 @@ def refuse_withdrawn(study: StudyPaths, rater: str) -> None:
         if event.kind == "withdrawn" and event.fields["rater"] == rater:
             raise ParameterError(
                 f"rater: needed one who takes part, {rater} was withdrawn on "
-                f"{event.time_utc[:10]} by {event.fields['who']}: "
-                f"{event.fields['why']}"
+                f"{event.fields.get('on') or event.time_utc[:10]}"
             )
 
 
@@ -443,7 +444,7 @@ def record_unblinding(
     protocol : Protocol
         The study's protocol.
     code : str or None
-        A code of a schedule; None for all of them.
+        A code of a schedule; None for all of them, of a study that is not sealed.
     who, why : str
         Who is to know, and for what reason.
     rater, session : str, optional
@@ -461,7 +462,8 @@ def record_unblinding(
     ParameterError
         If `who` or `why` is blank.
     ScheduleError
-        If no drawn schedule has the code, several have it, or one is damaged.
+        If no drawn schedule has the code, several have it, or one is damaged, or
+        sealed where all are asked for.
     SessionLogError
         If the log of the study's conduct is damaged.
     OSError
@@ -473,9 +475,15 @@ def record_unblinding(
         for pair in protocol.rater_sessions
         if rater in (None, pair[0]) and session in (None, pair[1])
     ]
+    drawn = [schedule for _, schedule in _read_drawn(study, meant)]
+    if code is None and any(schedule.is_closed for schedule in drawn):
+        raise ScheduleError(
+            f"code: needed one of {study.schedules}, which is sealed, got none: --all "
+            "alone opens it, once every session is over"
+        )
     revealed = tuple(
         (schedule, shown)
-        for _, schedule in _read_drawn(study, meant)
+        for schedule in drawn
         for shown in _open_schedule(study, protocol, schedule).presentations
         if code in (None, shown.code)
     )

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from datetime import date, datetime
 from functools import partial
 from heapq import merge
-from itertools import accumulate
+from operator import itemgetter
 from pathlib import Path
 
 import masrel
@@ -21,8 +21,10 @@ from masrel.lab._event_log import (
     Event,
     SessionLog,
     check_kinds,
+    events_before_torn,
     line_hashes,
     read_log,
+    timed_events,
     utc_now,
 )
 from masrel.lab._study_files import Fact
@@ -127,35 +129,18 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
 
 def conduct_hash(study: StudyPaths) -> str | None:
     """Return a hash of what `read_conduct` returns; None where that is nothing."""
-    return _hash_of(read_conduct(study))
-
-
-def earlier_conduct_hashes(study: StudyPaths) -> set[str | None]:
-    """Return what `conduct_hash` returned before each of the events."""
-    events = read_conduct(study)
-    return {_hash_of(events[:n]) for n in range(len(events))}
-
-
-def _hash_of(events: Sequence[Event]) -> str | None:
-    if not events:
-        return None
-    facts = [(e.time_utc, e.kind, dict(e.fields)) for e in events]
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+    facts = [(e.time_utc, e.kind, dict(e.fields)) for e in read_conduct(study)]
+    text = json.dumps(facts, sort_keys=True).encode()
+    return hashlib.sha256(text).hexdigest() if facts else None
 
 
 def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
     """Yield every event of a study's logs, with its log, in order of time."""
-    logs = [_timed(path) for path in study.conduct_logs()]
-    for _, log, event in merge(*logs, key=lambda timed: timed[0]):
+    logs = study.conduct_logs()
+    for log in logs:
+        _check_events(log, read_log(log))
+    for _, log, event in merge(*map(timed_events, logs), key=itemgetter(0)):
         yield log, event
-
-
-def _timed(log: Path) -> list[tuple[str, Path, Event]]:
-    # a clock that is set back changes no order within a log
-    events = read_log(log)
-    _check_events(log, events)
-    latest = accumulate((event.time_utc for event in events), max)
-    return [(time, log, event) for time, event in zip(latest, events, strict=True)]
 
 
 def _check_events(log: Path, events: Iterable[Event]) -> None:
@@ -173,6 +158,13 @@ def append_event(
     """Append an event to the log of a study; the first one comes after a head."""
     with open_conduct(study, protocol, now=now) as log:
         log.append(kind, fields)
+
+
+def recover_conduct(study: StudyPaths) -> None:
+    """Set aside what was written of a line, so that what reads the log can go on."""
+    log = study.conduct_file
+    if log.exists() and events_before_torn(log) is not None:
+        SessionLog.open(log, wait_s=_WAIT_S).close()
 
 
 @contextmanager

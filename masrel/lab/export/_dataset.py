@@ -27,7 +27,13 @@ from masrel.lab._study_files import (
 )
 from masrel.lab.progress import raters_csv
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.ratings import Ratings, answers_csv, ratings_csv, read_study_data
+from masrel.lab.ratings import (
+    Ratings,
+    StudyData,
+    answers_csv,
+    ratings_csv,
+    read_study_data,
+)
 from masrel.lab.run import read_log
 
 MISSING = "NA"
@@ -138,7 +144,7 @@ def gather_dataset(
         ],
         files=files,
         report=[] if shown else sorted(paths.report.rglob("*")),
-        description=_description(protocol, data.ratings),
+        description=_description(data),
         day=day,
         left_out=tuple(left_out),
     )
@@ -285,10 +291,12 @@ def _recordings(
                     yield rater, session, path
 
 
-def _description(protocol: Protocol, ratings: Ratings) -> str:
+def _description(data: StudyData) -> str:
+    protocol = data.protocol
     sentences = [f"{protocol.study.title}."]
     if protocol.study.source:
         sentences.append(f"Source: {protocol.study.source}.")
     grades = ", ".join(protocol.scale.grades)
     sentences.append(f"Scale {protocol.scale.name}: {grades}.")
-    return " ".join(filter(None, [*sentences, ratings.simulated_counts]))
+    sentences += [f"{change}." for change in data.changes]
+    return " ".join(filter(None, [*sentences, data.ratings.simulated_counts]))

@@ -3,7 +3,7 @@
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Sequence
-from datetime import date, datetime
+from datetime import datetime
 from pathlib import Path
 
 import masrel
@@ -11,7 +11,13 @@ from masrel._files import check_inside
 from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab._study_files import Fact
-from masrel.lab.conduct._study_log import append_event, stated, study_answers
+from masrel.lab.conduct._study_log import (
+    append_event,
+    past_day,
+    recover_conduct,
+    stated,
+    study_answers,
+)
 from masrel.lab.paper._form import (
     FilledRow,
     Form,
@@ -26,15 +32,13 @@ from masrel.lab.run._presenter import check_same
 from masrel.lab.run._state import (
     FORMAT,
     FROM_PAPER,
+    NO_DEVICE,
     SessionState,
     SheetDifference,
     replay,
     sheet_differences,
 )
 from masrel.lab.schedule.sheets import _drawn_schedule
-
-NO_DEVICE = "none"
-"""What logs call the device where nobody says what presented the models."""
 
 _DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
@@ -47,7 +51,7 @@ def enter_sheet(
     session: str,
     *,
     who: str,
-    on: date | None = None,
+    on: str | None = None,
     device: str = NO_DEVICE,
     now: Callable[[], datetime] = utc_now,
 ) -> SessionState:
@@ -68,9 +72,9 @@ def enter_sheet(
         Whose sheet.
     who : str
         Who typed it.
-    on : date, optional
-        Day of the session, as on the sheet: from it the days between sessions are
-        counted.
+    on : str, optional
+        Day of the session, ISO 8601, as on the sheet: from it the days between sessions
+        are counted.
     device : str, optional
         What presented the models, where another program ran it; "none" unless given.
     now : callable, optional
@@ -93,7 +97,8 @@ def enter_sheet(
         If the session was begun with a device, or entered before, or its log is
         damaged.
     ParameterError
-        If `who` is blank, `on` is a day to come, or `device` is no name or simulated.
+        If `who` is blank, `on` is no day or one to come, or `device` is no name or
+        simulated.
     OSError
         If the log cannot be written.
 
@@ -103,7 +108,9 @@ def enter_sheet(
         If the session was out of the order, or the interval, of the protocol.
     """
     reasons = stated(who=who)
-    _check(on, device, now)
+    day = None if on is None else past_day("on", on, now)
+    _check_device(device)
+    recover_conduct(study)
     sheet, rows, form = filled_sheet(study, protocol, file, rater, session)
     _refuse_answered(study, sheet, rows, rater)
     log_file = study.log_file(rater, session)
@@ -112,9 +119,9 @@ def enter_sheet(
         state = replay(log.path, log.events)
         _begin(study, protocol, form, device, state, log)
         _refuse_entered(sheet, log)
-        if on is not None:
+        if day is not None:
             if state.held_on is None:
-                log.append("held", {"on": on.isoformat()})
+                log.append("held", {"on": day})
             log_interval(study, protocol, rater, session, log)
         for row in rows:
             if row.place == "study":
@@ -197,10 +204,7 @@ def _refuse_unpresented(form: Form, state: SessionState, path: Path) -> None:
         )
 
 
-def _check(on: date | None, device: str, now: Callable[[], datetime]) -> None:
-    today = now().astimezone().date()
-    if on is not None and on > today:
-        raise ParameterError(f"on: needed a day up to {today}, got {on}")
+def _check_device(device: str) -> None:
     # what is simulated is run by masrel, and says so in the log
     if not _DEVICE.fullmatch(device) or "simulated" in device.casefold():
         raise ParameterError(

@@ -166,6 +166,18 @@ def read_typed(path: Path) -> TypedSheet:
     )
 
 
+def has_answers(path: Path) -> bool:
+    """Return whether something has been typed into a file, or it cannot be read."""
+    blank = {"sheet", "position", "code"}
+    try:
+        rows = read_typed(path).rows
+    except RatingsError:
+        return True
+    return any(
+        cell for row in rows for key, cell in row.cells.items() if key not in blank
+    )
+
+
 def _is_head(cell: str) -> bool:
     return cell.startswith("#") or cell.casefold().startswith("sep=")
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import masrel
 from masrel._files import write_files
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import ParameterError
 from masrel.lab._study_files import csv_text
-from masrel.lab.paper._form import Form, form_of, read_typed
+from masrel.lab.paper._form import Form, form_of, has_answers
 from masrel.lab.protocol import Protocol, Question, StudyPaths, scale_of
 from masrel.lab.run._rehearsal import practice_presentations
 from masrel.lab.run.console import _instruction
@@ -123,18 +123,6 @@ def _places(
     # those that were not named may be drawn later, or elsewhere
     drawn = [place for place in places if study.schedule_file(*place).exists()]
     return places if raters or not drawn else drawn
-
-
-def has_answers(path: Path) -> bool:
-    """Return whether something has been typed into a file, or it cannot be read."""
-    blank = {"sheet", "position", "code"}
-    try:
-        rows = read_typed(path).rows
-    except RatingsError:
-        return True
-    return any(
-        cell for row in rows for key, cell in row.cells.items() if key not in blank
-    )
 
 
 def _typed_text(form: Form) -> str:

@@ -360,7 +360,7 @@ def _content_differences(
 
 
 def _has_ids(value: Any) -> bool:
-    return isinstance(value, list) and all(
+    return isinstance(value, list | tuple) and all(
         isinstance(entry, dict) and "id" in entry for entry in value
     )
 

@@ -1,6 +1,6 @@
 """What a study's table of ratings leaves out, and what happened to the study."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -129,9 +129,10 @@ def study_remarks(
     -------
     tuple of str
         A sentence each for raters who were withdrawn or are excluded, codes that were
-        unblinded, logs of no rater of the protocol, skipped presentations, sessions
-        that were begun anew, empty logs, recordings without a log, and ratings that are
-        not from the logs that there are. Empty when there is nothing to say.
+        unblinded, logs of no rater of the protocol, days that were corrected, skipped
+        presentations, sessions that were begun anew, empty logs, recordings without a
+        log, and ratings that are not from the logs that there are. Empty when there is
+        nothing to say.
 
     Raises
     ------
@@ -177,13 +178,13 @@ def _of_conduct(study: StudyPaths, include: Collection[str]) -> Iterator[str]:
         fields = event.fields
         if "why" not in fields:
             continue
-        by = f"on {event.time_utc[:10]}{_by_whom(event, include)}."
+        by = f"on {fields.get('on') or event.time_utc[:10]}{_by_whom(event, include)}."
         if event.kind == "withdrawn":
             rater = fields["rater"]
-            states = map(_state_of, study.sessions.glob(f"*_{rater}.jsonl"))
+            logs = map(_read, study.sessions.glob(f"*_{rater}.jsonl"))
             n_graded = sum(
                 len(state.grades)
-                for state in states
+                for _, state in logs
                 if state.header.get("rater") == rater
             )
             counted = "" if rater in latest else " and counted"
@@ -227,6 +228,7 @@ def _of_sessions(
                 "so), or move the log out of the study."
             )
         elif log.stat().st_size:
+            yield from _of_days(study, log, include)
             yield from _of_skips(study, log, include)
             yield from _of_second_entries(study, log, of_study)
         else:
@@ -242,9 +244,18 @@ def _of_sessions(
             )
 
 
+def _of_days(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:
+    for event in _read(log)[0]:
+        if event.kind == "day-correction":
+            yield (
+                f"{_name(study, log)}: the session was held on {event.fields['on']}, "
+                f"as was corrected on {event.time_utc[:10]}{_by_whom(event, include)}."
+            )
+
+
 def _of_skips(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:
     # those that did not get their grade later, and grades that count no more
-    state = _state_of(log)
+    _, state = _read(log)
     if state.n_set_aside:
         yield (
             f"{_name(study, log)}: the session was begun anew; grades from before, "
@@ -264,7 +275,7 @@ def _of_second_entries(
     log: Path,
     of_study: Mapping[str, Mapping[tuple[str, str], Answer]],
 ) -> Iterator[str]:
-    state = _state_of(log)
+    _, state = _read(log)
     of_rater = of_study.get(str(state.header.get("rater")), {})
     for each in sheet_differences(state, of_rater):
         code = "" if each.code is None else f" code {each.code},"
@@ -278,12 +289,12 @@ def _of_second_entries(
         )
 
 
-def _state_of(log: Path) -> SessionState:
-    # of a log that cannot be read none; it is said to be damaged where it is read
+def _read(log: Path) -> tuple[Sequence[Event], SessionState]:
+    # of a log that cannot be read nothing; it is said to be damaged where it is read
     try:
-        return read_session(log)[1]
+        return read_session(log)
     except MasrelError:
-        return SessionState()
+        return (), SessionState()
 
 
 def _name(study: StudyPaths, path: Path) -> str:

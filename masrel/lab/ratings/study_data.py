@@ -3,7 +3,7 @@
 import hashlib
 import math
 import statistics
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -17,11 +17,19 @@ from masrel.lab._study_files import (
     MAX_TABLE,
     csv_format,
     format_problem,
+    read_once,
     read_regular,
 )
-from masrel.lab.conduct import excluded_raters
+from masrel.lab.conduct import PlanChange, excluded_raters, plan_changes
+from masrel.lab.conduct._plan_versions import is_of_earlier
+from masrel.lab.progress import raters_csv
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
-from masrel.lab.ratings.answers import GivenAnswer, answers_of
+from masrel.lab.ratings.answers import (
+    GivenAnswer,
+    answers_csv,
+    answers_from_logs,
+    answers_of,
+)
 from masrel.lab.ratings.study_file import InPerson, read_in_person, read_study_ratings
 from masrel.lab.ratings.table import (
     _FORMAT,
@@ -33,7 +41,8 @@ from masrel.lab.ratings.table import (
 )
 from masrel.lab.run._state import FROM_PAPER, FROM_PERSONS, SessionState, read_session
 from masrel.lab.schedule import Schedule, check_schedule, read_schedule
-from masrel.lab.schedule.presentation import _SEALED
+
+_N_HEAD = 2  # lines at the head of a table that not every format has
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +63,8 @@ class StudyData:
         Raters who are left out of the analysis.
     answers : tuple of GivenAnswer
         Answers to questionnaires.
+    changes : tuple of PlanChange
+        What has changed in the plan since the first draw.
     read : str
         What was read, in words.
     """
@@ -64,9 +75,11 @@ class StudyData:
     in_person: InPerson | None
     excluded: tuple[str, ...]
     answers: tuple[GivenAnswer, ...]
+    changes: tuple[PlanChange, ...]
     read: str
 
 
+@read_once()
 def read_study_data(
     study: StudyPaths,
     protocol: Protocol,
@@ -105,18 +118,21 @@ def read_study_data(
     """
     if file is None and study.logs():
         ratings = ratings_from_logs(study, protocol)
-        _refuse_other_table(study.ratings_file, ratings)
-        read = f"{len(ratings.rows)} ratings from the logs in {study.sessions}"
-        if not allows_sealed and any(row.model == _SEALED for row in ratings.rows):
-            raise RatingsError(
-                f"{study.schedules}: who met which model is sealed until every session "
-                "is over: masrel status says how far it is, and then masrel record "
-                "unblind --all opens it"
-            )
+        is_stale, problem = _table_problem(study, protocol)
+        if problem and not is_stale:
+            raise RatingsError(problem)
+        read = f"{len(ratings.rows)} ratings from the logs in {study.sessions}" + (
+            f"; {problem}" if problem else ""
+        )
     else:
         source = file or _file_of(study)
         ratings = read_study_ratings(source, scale_of(protocol))
         read = f"{len(ratings.rows)} ratings from {source}"
+    if ratings.is_sealed and not allows_sealed:
+        raise RatingsError(
+            f"{study.schedules}: which models were met is sealed: masrel record "
+            "unblind --all opens it, once every session is over"
+        )
     return StudyData(
         paths=study,
         protocol=protocol,
@@ -124,6 +140,7 @@ def read_study_data(
         in_person=in_person_of(study, ratings),
         excluded=excluded_raters(study),
         answers=answers_of(study, protocol, file=file),
+        changes=plan_changes(study, protocol),
         read=read,
     )
 
@@ -164,31 +181,57 @@ def _file_of(study: StudyPaths) -> Path:
     )
 
 
-def _refuse_other_table(path: Path, ratings: Ratings) -> None:
-    """Refuse a study's ``ratings.csv`` that is not what its logs say."""
-    differences = list(_table_differences(path, _texts(ratings), newest=_FORMAT))
-    if differences:
-        more = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
-        raise RatingsError(
-            f"{path}: is not what the session logs say: {differences[0]}{more}; masrel "
-            f"ratings writes it anew, --ratings {path} uses it as it is"
-        )
+def _table_problem(study: StudyPaths, protocol: Protocol) -> tuple[bool, str]:
+    """Return whether ``ratings.csv`` is out of date, and what is wrong with it."""
+    path = study.ratings_file
+    is_stale, differences = _table_differences(study, protocol, path)
+    if not differences:
+        return False, ""
+    more = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
+    return is_stale, (
+        f"{path}: is {'out of date' if is_stale else 'not what the session logs say'}: "
+        f"{differences[0]}{more}; masrel ratings writes it anew, --ratings {path} uses "
+        "it as it is"
+    )
 
 
 def _table_differences(
-    path: Path, texts: Iterable[str], *, newest: int
-) -> Iterator[str]:
-    """Yield how a study's table differs, line by line, from what its logs say.
+    study: StudyPaths, protocol: Protocol, path: Path
+) -> tuple[bool, list[str]]:
+    """Return whether a table is what logs said once, and how it differs from them now.
 
-    `texts` are all that a table of these logs has ever been, and `newest` is the
-    version of its format. A file that is not there differs in nothing.
+    It is that of ratings, of answers or of raters; one that is not there differs in
+    nothing.
     """
+    # all that a table of the same logs has ever been
+    texts: Callable[[Protocol], Iterable[str]] = {
+        study.ratings_file: lambda then: _texts(
+            ratings_from_logs(study, then, check_recordings=False)
+        ),
+        study.answers_file: lambda then: [answers_csv(answers_from_logs(study, then))],
+        study.raters_file: lambda then: [raters_csv(study, then)],
+    }[path]
     if not path.is_file():
-        return
+        return False, []
     text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
-    known = list(texts)
-    if text in known:
-        return
+
+    def is_made(then: Protocol) -> bool | None:
+        known = iter(texts(then))
+        n_more = (first := next(known)).count("\n") - text.count("\n")
+        if n_more < 0:
+            return None
+        # more at the head, or rows that came later
+        return n_more <= _N_HEAD and (text == first or text in known)
+
+    if is_made(protocol):
+        return False, []
+    if is_of_earlier(study, protocol, is_made):
+        return True, ["needed what the logs say, got what they said earlier"]
+    known, is_of_ratings = [*texts(protocol)], path == study.ratings_file
+    return False, [*_line_differences(text, known, _FORMAT if is_of_ratings else 1)]
+
+
+def _line_differences(text: str, known: list[str], newest: int) -> Iterator[str]:
     problem = format_problem(csv_format(text), newest=newest)
     if problem is not None:
         yield problem

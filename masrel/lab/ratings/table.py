@@ -11,6 +11,7 @@ from masrel._files import write_file
 from masrel.errors import RatingsError
 from masrel.lab._study_files import is_unknown, table_csv
 from masrel.lab.run._state import FELT, FROM_PERSONS
+from masrel.lab.schedule.presentation import _SEALED
 from masrel.scales import Scale
 
 if TYPE_CHECKING:
@@ -142,6 +143,11 @@ class Ratings:
     scale: Scale
     source_path: Path | None = None
     simulated: bool
+
+    @property
+    def is_sealed(self) -> bool:
+        """Whether nobody says yet which models some of them are of."""
+        return any(row.model == _SEALED for row in self.rows)
 
     @property
     def n_by_programs(self) -> int:

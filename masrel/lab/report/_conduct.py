@@ -13,6 +13,7 @@ from masrel.lab.conduct._study_log import conduct_hash
 from masrel.lab.progress import (
     RaterProgress,
     SessionProgress,
+    open_sessions,
     rater_progress,
     session_progress,
 )
@@ -80,14 +81,16 @@ class StudyConduct:
         return tuple(s for s in self.sessions if s.last_event is not None)
 
     @property
+    def goes_on(self) -> bool:
+        """Whether a session is still to come of a rater who takes part."""
+        return bool(open_sessions(self.sessions, self.raters))
+
+    @property
     def interim(self) -> str:
         """How many sessions are complete, while others are awaited; else nothing."""
-        gone = [r.rater for r in self.raters if r.status in ("withdrawn", "excluded")]
-        complete = [s.stage == "complete" for s in self.sessions]
-        pairs = zip(self.sessions, complete, strict=True)
-        is_interim = any(not is_ and s.rater not in gone for s, is_ in pairs)
-        text = f"{INTERIM}: {sum(complete)} of {counted(len(complete), 'session')}"
-        return text * bool(self.begun and is_interim)
+        n_complete = sum(session.stage == "complete" for session in self.sessions)
+        text = f"{INTERIM}: {n_complete} of {counted(len(self.sessions), 'session')}"
+        return text * bool(self.begun and self.goes_on)
 
     @property
     def inputs(self) -> dict[str, str]:
@@ -202,7 +205,13 @@ def _flow(
         "planned": [r.rater for r in raters],
         "begun": [r.rater for r in raters if stages[r.rater] & {"begun", "complete"}],
         "complete": [r.rater for r in raters if stages[r.rater] == {"complete"}],
-        "withdrawn": [r.rater for r in raters if r.status == "withdrawn"],
+        # who left after a session was complete, not in that one
+        "withdrawn": [
+            r.rater
+            for r in raters
+            if r.status == "withdrawn"
+            and (session is None or stages[r.rater] != {"complete"})
+        ],
         "excluded": [r.rater for r in raters if r.status == "excluded"],
         "late": [r.rater for r in raters if r.is_late],
         "analysed": [*graded - set(material.analysis.excluded)],
@@ -357,16 +366,19 @@ def _details(event: Event, has_texts: bool) -> Iterator[str]:
 
 
 def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
+    columns = [
+        *_columns({"rater": "Rater", "session": "Session", "model": "Model"}),
+        Column(key="repeat", heading="Repeat"),
+        Column(key="first_grade", heading="First", align="center"),
+        Column(key="grade", heading="Corrected", align="center"),
+        *_private_columns(conduct),
+    ]
+    if material.ratings.is_sealed:
+        columns = [each for each in columns if each.key not in ("model", "repeat")]
     return table_of(
         "corrections",
         "Corrected grades",
-        [
-            *_columns({"rater": "Rater", "session": "Session", "model": "Model"}),
-            Column(key="repeat", heading="Repeat"),
-            Column(key="first_grade", heading="First", align="center"),
-            Column(key="grade", heading="Corrected", align="center"),
-            *_private_columns(conduct),
-        ],
+        columns,
         [asdict(each) for each in conduct.corrections],
         notes=(
             "Each correction in order of time, the last one of a presentation counts; "

@@ -31,7 +31,7 @@ from masrel.lab.report._grade_sections import (
     intended_section,
     questionnaires_section,
 )
-from masrel.lab.report._material import SUPPLEMENT, Material, gather
+from masrel.lab.report._material import SUPPLEMENT, Material, gather, sentence
 from masrel.lab.report._order_tables import order_section
 from masrel.lab.report._pages import CONVERTED, WRITERS, pandoc_version
 from masrel.lab.report._paragraphs import methods_section, result_text
@@ -245,7 +245,9 @@ def make_report(
     # formats: those that are made beside the protocol's
     # By name from the report's folder, in the order in which they are to be written
     protocol, analysis = material.protocol, material.analysis
-    names = [n for n in section_names(protocol) if not only or n in only]
+    is_sealed = material.ratings.is_sealed
+    every = section_names(protocol, is_sealed=is_sealed)
+    names = [name for name in every if not only or name in only]
     assets, inputs = dict[str, bytes](), dict(analysis.inputs)
     block = partial(_block, assets, progress, raw_csv)
     main, supplement = _parts(names, material)
@@ -254,7 +256,7 @@ def make_report(
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
-        result=result_text(material),
+        result=sentence("result", "sealed") if is_sealed else result_text(material),
         sections=chapters(main, block),
         # what the pages end with: the hash of everything they were made from
         inputs=(
@@ -264,20 +266,23 @@ def make_report(
         version=analysis.masrel_version,
         supplement=chapters(supplement, block, "S"),
     )
-    every = {*protocol.report.formats, *formats}
-    writers = [writer for name, writer in WRITERS.items() if name in every]
+    forms = {*protocol.report.formats, *formats}
+    writers = [writer for name, writer in WRITERS.items() if name in forms]
     pages = {file: write(document) for file, write in writers}
     pages[NUMBERS] = analysis_text(analysis).encode()
     if progress is not None:
         progress("pages")
     if material.conduct is not None:
         inputs |= material.conduct.inputs
-    pandoc = pandoc_version() if CONVERTED & every else None
-    return report_files(assets, pages, inputs, pandoc=pandoc)
+    pandoc = pandoc_version() if CONVERTED & forms else None
+    is_private = material.conduct is not None and material.conduct.goes_on
+    return report_files(assets, pages, inputs, pandoc=pandoc, is_private=is_private)
 
 
-def section_names(protocol: Protocol) -> list[str]:
+def section_names(protocol: Protocol, *, is_sealed: bool) -> list[str]:
     """Return the names of the sections that a report can have, in their order."""
+    if is_sealed:
+        return ["flow", "conduct"]
     names = list(report_sections(protocol))
     place = names.index("design") + 1 if "design" in names else 0
     # no protocol names them: they are there where there is anything to say

@@ -21,7 +21,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from masrel._files import make_folder, refuse_record, write_file, write_files
+from masrel._files import (
+    make_folder,
+    refuse_record,
+    usual_mode,
+    write_file,
+    write_files,
+)
 from masrel.errors import ParameterError
 from masrel.lab._study_files import (
     MANIFEST,
@@ -50,9 +56,10 @@ def report_files(
     inputs: Mapping[str, str],
     *,
     pandoc: str | None = None,
+    is_private: bool = False,
 ) -> dict[str, bytes]:
     """Return every file of a report in the order in which they are written."""
-    # pandoc: its version, where it made a page
+    # pandoc: its version, where it made a page; is_private: of a study that goes on
     # Imported here: whether a report is current is known without it.
     from masrel.lab.verification.record import _REPORT_FORMAT
 
@@ -62,6 +69,7 @@ def report_files(
         "inputs": dict(inputs),
         "files": {place: _hash(data) for place, data in written.items()},
         **({} if pandoc is None else {"pandoc": pandoc}),
+        **({"private": True} if is_private else {}),
     }
     manifest = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     return {**written, MANIFEST: manifest.encode()}
@@ -72,28 +80,43 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
     for name in files:
         if "/" not in name:
             refuse_record(folder / name)
-    with _alone(folder):
+    is_private = "private" in json.loads(files[MANIFEST])
+    with _alone(folder, 0o700 if is_private else None):
+        is_cut_off = (folder / UNFINISHED).exists()
+        was_private = is_cut_off or any("private" in d for d in _documents(folder))
         changed, stale = report_changes(folder, files)
-        if not changed and not stale and not (folder / UNFINISHED).exists():
-            return
-        known = _known_files(folder)
-        for place, data in files.items():
-            known.setdefault(place, []).append(_hash(data))
-        contents: dict[Path, bytes | str | None] = {
-            folder / UNFINISHED: json.dumps({"format": 1, "files": known}),
-            folder / MANIFEST: None,
-            **{folder / place: files[place] for place in changed if place != MANIFEST},
-            **dict.fromkeys(stale),
-        }
-        write_files(contents, within=folder)
-        manifest = {folder / MANIFEST: files[MANIFEST], folder / UNFINISHED: None}
-        write_files(manifest, within=folder)
+        if changed or stale or is_cut_off:
+            known = _known_files(folder)
+            for place, data in files.items():
+                known.setdefault(place, []).append(_hash(data))
+            contents: dict[Path, bytes | str | None] = {
+                folder / UNFINISHED: json.dumps({"format": 1, "files": known}),
+                folder / MANIFEST: None,
+                **{folder / name: files[name] for name in changed if name != MANIFEST},
+                **dict.fromkeys(stale),
+            }
+            mode = 0o600 if is_private else None
+            write_files(contents, within=folder, mode=mode)
+            manifest = {folder / MANIFEST: files[MANIFEST], folder / UNFINISHED: None}
+            write_files(manifest, within=folder, mode=mode)
+        if is_private or was_private:
+            _set_modes(folder, files, is_private=is_private)
+
+
+def _set_modes(folder: Path, files: Iterable[str], *, is_private: bool) -> None:
+    # also of what has not changed
+    modes = {folder / place: 0o666 for place in files}
+    modes |= {path.parent: 0o777 for path in modes}
+    if not (folder.parent / "protocol.toml").is_file():  # it may be somebody's
+        del modes[folder]
+    for path, mode in modes.items():
+        path.chmod(mode & 0o700 if is_private else usual_mode(mode))
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _alone(folder: Path, mode: int | None) -> Iterator[None]:
     # Of two builds at once one waits: else it would remove what the other links to.
-    make_folder(folder)
+    make_folder(folder, mode=mode)
     if sys.platform == "win32":
         yield
         return
@@ -121,16 +144,20 @@ def _differs(path: Path, hashes: Collection[str]) -> bool:
     return path.is_symlink() or file_hash(str(path)) not in hashes
 
 
-def _known_files(folder: Path) -> dict[str, list[str]]:
-    # hashes that the files of a report have, or had when one was cut off, by what the
-    # manifest and the list say; nothing if there is none
-    known: dict[str, list[str]] = {}
+def _documents(folder: Path) -> Iterator[dict[str, Any]]:
+    # its manifest, and the list of a report that was cut off, where there are any
     for name in (MANIFEST, UNFINISHED):
-        # it may be any JSON, or none
-        with contextlib.suppress(
-            OSError, ValueError, LookupError, TypeError, AttributeError
-        ):
+        with contextlib.suppress(OSError, ValueError):
             document = json.loads(read_regular(folder / name, most=MAX_TABLE))
+            if isinstance(document, dict):
+                yield document
+
+
+def _known_files(folder: Path) -> dict[str, list[str]]:
+    # hashes that the files of a report have, or had when one was cut off
+    known: dict[str, list[str]] = {}
+    for document in _documents(folder):
+        with contextlib.suppress(LookupError, TypeError, AttributeError):
             for place, hashes in document["files"].items():
                 known.setdefault(place, []).extend(
                     [hashes] if isinstance(hashes, str) else map(str, hashes)

@@ -8,9 +8,10 @@ from datetime import date, datetime, time, timedelta
 import msgspec
 
 from masrel.errors import MasrelWarning, ParameterError
-from masrel.lab._event_log import Event, SessionLog, read_log
+from masrel.lab._event_log import Event, SessionLog
 from masrel.lab._study_files import Fact
 from masrel.lab.protocol import Protocol, Session, StudyPaths
+from masrel.lab.run._state import SessionState, read_session, replay
 
 # Events that do not say when a rater was there last
 _NOT_THE_RATERS = ("recovered", "correction", "answer-correction", "stopped")
@@ -27,18 +28,20 @@ def last_time(events: Sequence[Event]) -> str:
     return [e.time_utc for e in events if e.kind not in _NOT_THE_RATERS][-1]
 
 
-def completed_at(study: StudyPaths, rater: str, session: str) -> str | None:
-    """Return when a session came to its end, or None."""
+def held_on(events: Sequence[Event], state: SessionState) -> date | None:
+    """Return the day of a session by its log; None before it has begun."""
+    if not events:
+        return None
+    completed = [event.time_utc for event in events if event.kind == "complete"]
+    time = state.held_on or next(iter(completed), last_time(events))
+    return datetime.fromisoformat(time).astimezone().date()
+
+
+def completed_on(study: StudyPaths, rater: str, session: str) -> date | None:
+    """Return the day of a session that has come to its end, or None."""
     log = study.log_file(rater, session)
-    events = read_log(log) if log.exists() else ()
-    completed = next((e.time_utc for e in events if e.kind == "complete"), None)
-    return None if completed is None else _own_day(events) or completed
-
-
-def _own_day(events: Sequence[Event]) -> str | None:
-    # that of a session whose log was written on another one
-    days = [e.fields["on"] for e in events if e.kind in ("held", "day-correction")]
-    return str(days[-1]) if days else None
+    events, state = read_session(log) if log.exists() else ((), SessionState())
+    return held_on(events, state) if state.is_complete else None
 
 
 def log_interval(
@@ -52,7 +55,7 @@ def log_interval(
         msgspec.structs.replace(each, order_policy="warn") for each in protocol.sessions
     )
     lenient = msgspec.structs.replace(protocol, sessions=sessions)
-    began = _own_day(log.events) or log.events[0].time_utc
+    began = replay(log.path, log.events).held_on or log.events[0].time_utc
     day = datetime.fromisoformat(began).astimezone().date()
     noon = datetime.combine(day, time(12))
     interval = interval_fields(study, lenient, rater, session, lambda: noon)
@@ -103,18 +106,29 @@ def _order(
     study: StudyPaths, rules: Session, rater: str, now: Callable[[], datetime]
 ) -> tuple[int | None, str | None]:
     # days since the session before, and what of the order does not hold
-    completed = completed_at(study, rater, str(rules.after))
-    days = None if completed is None else days_since(completed, now)
+    day = completed_on(study, rater, str(rules.after))
+    days = None if day is None else days_since(day.isoformat(), now)
     return days, _problem(rules, days)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Due:
-    """When a session that has not begun may begin."""
+    """When a session that has not begun may begin.
 
-    first: date | None = None  # None where any day will do, or nobody knows yet
-    last: date | None = None
-    refused: str | None = None  # why it does not begin today
+    Attributes
+    ----------
+    first, last : str or None
+        The first and the last day, ISO 8601; None where any day will do, or nobody
+        knows yet.
+    not_today : str or None
+        Why it should not begin today: it would be refused, or its turn has not come.
+    is_overdue : bool
+        Whether its last day is over.
+    """
+
+    first: str | None = None
+    last: str | None = None
+    not_today: str | None = None
     is_overdue: bool = False
 
 
@@ -130,16 +144,20 @@ def due_of(
     if rules is None:
         return Due()
     days, problem = _order(study, rules, rater, now)
-    refused = problem if rules.order_policy == "refuse" else None
     if days is None:
-        return Due(refused=refused)
+        return Due(not_today=problem)
     day = now().astimezone().date() - timedelta(days)
     low, high = (
-        None if n is None else day + timedelta(n)
+        None if n is None else (day + timedelta(n)).isoformat()
         for n in (rules.at_least_days, rules.at_most_days)
     )
-    is_overdue = rules.at_most_days is not None and days > rules.at_most_days
-    return Due(first=low, last=high, refused=refused, is_overdue=is_overdue)
+    is_late = rules.at_most_days is not None and days > rules.at_most_days
+    return Due(
+        first=low,
+        last=high,
+        not_today=None if is_late and rules.order_policy == "warn" else problem,
+        is_overdue=is_late,
+    )
 
 
 def _problem(rules: Session, days: int | None) -> str | None:

@@ -45,6 +45,8 @@ class GradeRequest:
         Whether nothing of this enters the study's ratings.
     practice : bool
         Whether it is for practice; its grade is no rating.
+    sealed : bool
+        Whether its recording is not to say which model it is of.
     rules : PresentationRules
         How often the arm may be stretched, and with which cues.
     status : PresentationStatus or None
@@ -83,6 +85,7 @@ class GradeRequest:
     n_faults: int = 0
     rehearsal: bool = False
     practice: bool = False
+    sealed: bool = False
     rules: PresentationRules = field(default_factory=PresentationRules)
     status: "PresentationStatus | None" = None
     n_stretches: int = 0

@@ -53,8 +53,7 @@ from masrel.lab.run._simulated_raters import (
     sensor_seed,
 )
 from masrel.lab.run._state import Felt
-from masrel.lab.schedule import Presentation
-from masrel.lab.schedule.presentation import _SEALED
+from masrel.lab.schedule.presentation import _hidden
 
 
 class StatusOfHand(PresentationStatus):
@@ -316,7 +315,7 @@ def _keep(
         "rater": request.rater,
         "session": request.session,
         "code": presentation.code,
-        **_named(protocol, presentation),
+        **_named(request),
         "position": presentation.position,
         "attempt": request.attempt,
     }
@@ -328,11 +327,10 @@ def _keep(
     return _outcome(recording, protocol, presentation.model, file, checksum)
 
 
-def _named(protocol: Protocol, presentation: Presentation) -> dict[str, Fact]:
+def _named(request: GradeRequest) -> dict[str, Fact]:
     # which model it was, unless nobody is to know
-    if protocol.blinding.sealed:
-        return {"model": _SEALED, "repeat": presentation.position}
-    return {"model": presentation.model, "repeat": presentation.repeat}
+    shown = _hidden(request.presentation) if request.sealed else request.presentation
+    return {"model": shown.model, "repeat": shown.repeat}
 
 
 def _outcome(

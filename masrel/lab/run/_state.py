@@ -22,6 +22,9 @@ FELT: tuple[Felt, ...] = get_args(Felt)
 FROM_PAPER = "paper"
 """The source of grades that were written on a sheet."""
 
+NO_DEVICE = "none"
+"""What logs call the device where nobody says what presented the models."""
+
 AT_THE_DEVICE = ("console", "browser")
 """Where a person grades while models are presented: a session begun at one goes on at
 the other."""

@@ -23,6 +23,7 @@ from masrel.lab.conduct._statements import refuse_withdrawn
 from masrel.lab.conduct._study_log import (
     append_event,
     check_choice,
+    recover_conduct,
     stated,
     study_answers,
 )
@@ -31,7 +32,7 @@ from masrel.lab.protocol._values import questions_of
 from masrel.lab.protocol.content import _refuse_unknown_coefficients
 from masrel.lab.run._corrections import correct_in_session
 from masrel.lab.run._days import (
-    completed_at,
+    completed_on,
     days_since,
     interval_fields,
     last_time,
@@ -173,6 +174,7 @@ def run_session(
         )
     _refuse_unknown_coefficients(protocol, study.protocol)
     _check_device(clock, protocol)
+    recover_conduct(study)
     refuse_withdrawn(study, rater)
     if rehearsal:
         begun = begin_rehearsal(study, protocol, rater, session)
@@ -426,7 +428,7 @@ class _Runner(Presenter):
         sessions = [each.id for each in protocol.sessions if rater in each.raters]
         if not questions_of(protocol, "study"):
             return
-        if all(completed_at(study, rater, each) for each in sessions):
+        if all(completed_on(study, rater, each) for each in sessions):
             ask_questions(
                 protocol,
                 "study",
@@ -455,6 +457,7 @@ class _Runner(Presenter):
             ),
             attempt=1,
             practice=is_practice,
+            sealed=self._schedule.sealed and not is_practice,
             rehearsal=self._is_rehearsal,
             rules=self._protocol.presentation,
             may_skip=True,

@@ -16,7 +16,7 @@ from typing import Self, TypeVar
 
 from numpy.random import PCG64
 
-from masrel._files import make_folder, write_files
+from masrel._files import write_files
 from masrel.errors import ScheduleError
 from masrel.lab._study_files import MAX_SMALL, read_regular
 from masrel.lab.protocol import Protocol, StudyPaths
@@ -94,9 +94,8 @@ def find_secret(study: StudyPaths) -> StudySecret | None:
 def new_secret(study: StudyPaths) -> StudySecret:
     """Draw the secret of a study and keep it where only its owner can read it."""
     secret = secrets.token_bytes(N_BYTES)
-    make_folder(study.secret_file.parent, mode=0o700)
     text = SECRET_TEXT.format(secret.hex())
-    write_files({study.secret_file: text}, within=study.root, mode=0o600)
+    write_files({study.secret_file: text}, within=study.root)
     return StudySecret.of_study(secret)
 
 
@@ -209,7 +208,6 @@ def copy_for_site(
     )
     secret = {copy.secret_file: text.encode()}
     _check_new_folder(destination, secret | contents)
-    make_folder(copy.secret_file.parent, mode=0o700)
     write_files(secret | contents, within=destination, mode=0o600)
 
 

@@ -15,6 +15,7 @@ from masrel.lab._study_files import (
     check_format,
     csv_format,
     format_problem,
+    lines_then,
     once,
     read_regular,
     repeated,
@@ -359,7 +360,8 @@ def read_schedule(path: Path) -> Schedule:
         ),
     )
     opened_file = path.parent / _OPENED / path.name
-    if not schedule.is_closed or not opened_file.exists():
+    is_opened = opened_file.exists() and lines_then(path) is None
+    if not (schedule.is_closed and is_opened):
         return schedule
     opened = read_schedule(opened_file)
     if _closed(opened) != schedule:
@@ -369,13 +371,13 @@ def read_schedule(path: Path) -> Schedule:
 
 def _closed(schedule: Schedule) -> Schedule:
     """Return a schedule without its models."""
-    return replace(
-        schedule,
-        presentations=tuple(
-            replace(shown, model=_SEALED, repeat=shown.position)
-            for shown in schedule.presentations
-        ),
-    )
+    hidden = tuple(map(_hidden, schedule.presentations))
+    return replace(schedule, presentations=hidden)
+
+
+def _hidden(shown: Presentation) -> Presentation:
+    """Return a presentation without its model."""
+    return replace(shown, model=_SEALED, repeat=shown.position)
 
 
 def _head_entry(line: str) -> tuple[str, str]:

@@ -184,11 +184,13 @@ def _drawn_texts(
     if (problem := order_problem(protocol)) is not None:
         raise ScheduleError(f"{study.protocol}: {problem}")
     key = find_secret(study)
+    there = [*_read_drawn(study, protocol.rater_sessions, skips_damaged=True)]
     if key is not None:
         for rater, _ in to_draw:  # refused before a row is allotted
             key.of(site_of(protocol, rater))
-        for file, drawn in _unchanged(study, protocol, to_draw):
-            if drawn.commitment not in (None, key.commitment):
+        for file, drawn in there:
+            is_kept = (drawn.rater, drawn.session) not in to_draw
+            if is_kept and drawn.commitment not in (None, key.commitment):
                 raise ScheduleError(
                     f"{study.secret_file}: needed the secret of {file.name}, whose "
                     f"commitment is {drawn.commitment}, got another"
@@ -197,22 +199,19 @@ def _drawn_texts(
     drawn_from = _content_file(study, presented_hash(protocol))
     if not drawn_from.exists():
         texts[drawn_from] = presented_content(protocol)
+    # whatever the protocol says now, what was sealed at the first draw stays so
+    is_sealed = protocol.blinding.sealed or any(each.sealed for _, each in there)
     rows = {} if allot is None else allot(to_draw)
     key = key or new_secret(study)
     for place in to_draw:
         drawn = draw_schedule(protocol, *place, secret=key, row=rows.get(place))
+        if is_sealed:
+            drawn = _closed(replace(drawn, sealed=True))
         # The sheet gets its name first: one without its schedule is drawn anew.
         texts[study.sheet_file(*place)] = _sheet_text(drawn)
-        text = _schedule_text(_closed(drawn) if drawn.sealed else drawn)
-        texts[study.schedule_file(*place)] = text
+        texts[study.schedule_file(*place)] = _schedule_text(drawn)
+        study.opened_file(*place).unlink(missing_ok=True)  # of what was drawn before
     return texts
-
-
-def _unchanged(
-    study: StudyPaths, protocol: Protocol, to_draw: Sequence[_RaterSession]
-) -> Iterator[tuple[Path, Schedule]]:
-    others = [place for place in protocol.rater_sessions if place not in to_draw]
-    return _read_drawn(study, others, skips_damaged=True)
 
 
 def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from typing import Literal
 
 import segno
 
-from masrel._files import make_folder, write_files
+from masrel._files import write_files
 from masrel.errors import MasrelError, ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_json, read_regular
 from masrel.lab.protocol import StudyPaths
@@ -173,7 +173,7 @@ class Access:
                 del self._raters[next(iter(self._raters))]
             text = json.dumps({"format": 1, "tablets": self._raters}, indent=1)
             files = {self._tablets_file: f"{text}\n"}
-            write_files(files, within=self._root, mode=0o600)
+            write_files(files, within=self._root)
         return self._raters[tablet] == rater
 
     def _signed(self, visitor: Visitor, issued: int) -> str:
@@ -225,10 +225,9 @@ def _read_tablets(file: Path) -> dict[str, str]:
 def _find_key(file: Path, root: Path) -> bytes:
     """Return the key that cookies are signed with; draw it where there is none."""
     if not file.is_file():
-        make_folder(file.parent, mode=0o700)
         key = secrets.token_bytes(_N_BYTES)
         text = f"format: 1\nkey: {key.hex()}\n"
-        write_files({file: text}, within=root, mode=0o600)
+        write_files({file: text}, within=root)
         return key
     text = read_regular(file, most=MAX_SMALL).decode("utf-8", errors="replace")
     if match := _KEY_TEXT.fullmatch(text):

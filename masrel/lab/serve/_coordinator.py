@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import dataclasses
 import json
 import math
 import os
@@ -26,17 +25,17 @@ from masrel.lab._study_files import read_once
 from masrel.lab.conduct import (
     Note,
     allot_schedules,
-    read_conduct,
     record_note,
     record_standing,
     record_unblinding,
 )
 from masrel.lab.conduct._study_log import check_choice, check_rater
-from masrel.lab.progress import next_step, rater_progress, session_progress
+from masrel.lab.progress import study_status
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.run import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
+from masrel.lab.sealing import is_sealed
 from masrel.lab.serve._access import Access, qr_svg
 from masrel.lab.serve._live import SampleTail
 from masrel.lab.serve._manager import SessionManager
@@ -213,7 +212,7 @@ class CoordinatorPages(Pages):
 
     def _live(self, tail: SampleTail | None) -> tuple[str, Any]:
         return "live", {"begins": True} if tail is None else _frame(
-            tail, is_sealed=bool(self._overview.get("sealed"))
+            tail, is_sealed=self._overview.get("sealed", True)
         )
 
     async def act(self, request: Request) -> Response:
@@ -405,35 +404,18 @@ def overview(study: StudyPaths) -> dict[str, Any]:
     By the logs; no model is named.
     """
     protocol = read_protocol(study.protocol)
-    sessions = session_progress(study, protocol)
-    raters: list[dict[str, Any]] = []
-    events: list[dict[str, Any]] = []
-    problem, step = None, None
-    try:
-        progress = rater_progress(study, protocol, sessions)
-        raters = [{"rater": each.rater, "status": each.status} for each in progress]
-        step = dataclasses.asdict(next_step(study, sessions, progress))
-        events = [
-            {"event": event.kind, "time_utc": event.time_utc, **event.fields}
-            for event in read_conduct(study)[-_N_EVENTS:]
-        ]
-    except MasrelError as error:  # hides no session
-        problem = str(error)
+    stands = study_status(study, protocol)
     return {
-        "study": protocol.study.id,
+        **stands,
+        "events": stands["events"][-_N_EVENTS:],
         "title": protocol.study.title,
-        "sessions": [dataclasses.asdict(session) for session in sessions],
-        "raters": raters,
-        "events": events,
-        "problem": problem,
-        "next": step,
         "grades": list(protocol.scale.grades),
         "questions": [
             f"{questionnaire.id}.{question.id}"
             for questionnaire in protocol.questionnaires
             for question in questionnaire.questions
         ],
-        "sealed": protocol.blinding.sealed,
+        "sealed": is_sealed(study, protocol),
         "device": {name: getattr(protocol.device, name) for name in _DEVICE},
         "n_torque_problems": len(tuple(torque_problems(protocol))),
         "has_report": (study.root / "report" / "report.html").is_file(),

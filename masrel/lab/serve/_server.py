@@ -223,7 +223,7 @@ def alone(study: StudyPaths) -> Iterator[None]:
     """
     # Released by the system when the process ends, killed or not.
     folder = study.serve_key_file.parent
-    make_folder(folder, mode=0o700)
+    make_folder(folder)
     descriptor = os.open(folder / "serve.lock", os.O_RDWR | os.O_CREAT, 0o600)
     with os.fdopen(descriptor) as file:
         try:

@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -27,7 +27,7 @@ from masrel.lab._study_files import (
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import _FORMAT as _RECORDING_FORMAT
 from masrel.lab.schedule import Presentation
-from masrel.lab.schedule.presentation import _SEALED
+from masrel.lab.schedule.presentation import _SEALED, _hidden
 
 _Checked = TypeVar("_Checked")
 
@@ -50,8 +50,9 @@ class Finding:
     Attributes
     ----------
     weight : {"broken", "stale", "doubt"}
-        What is stale was made of an earlier state of the record, by what it says
-        itself; a doubt may have an innocent reason. A record with these alone is whole.
+        Broken is what no state of the record can have been or made. What is stale was
+        made of an earlier state, or of something that no log keeps; a doubt may have an
+        innocent reason.
     path : Path
         The file or folder that it is about.
     message : str
@@ -180,7 +181,7 @@ def recording_findings(
         yield broken(path, problem)
     as_shown = shown[code]
     if facts.get("model") == _SEALED:  # as it was recorded
-        as_shown = replace(as_shown, model=_SEALED, repeat=as_shown.position)
+        as_shown = _hidden(as_shown)
     needed: dict[str, object] = {
         **of,
         "sha256": event.fields["sha256"],
@@ -333,7 +334,8 @@ def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Fi
     ------
     Finding
         A log that is gone, is shorter than it was, or has another line there. Logs
-        that have grown since are fine.
+        that have grown since are fine, and so is that of a study's conduct in a study
+        that it was merged into.
 
     Raises
     ------
@@ -344,6 +346,14 @@ def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Fi
     hashes: dict[str, tuple[str, ...]] = {}
     for anchor in anchors:
         path = study.root / anchor.log
+        if (
+            path == study.conduct_file
+            and any(  # that of a site is elsewhere now
+                anchor.sha256 in line_hashes(log)[anchor.line - 1 :][:1]
+                for log in study.conduct_logs()
+            )
+        ):
+            continue
         if anchor.log not in logs:
             yield broken(path, "needed the log that an anchor names, got no file")
             continue

@@ -90,12 +90,15 @@ def check_session(
         findings.append(problem)
     if state is None or schedule is None:
         is_none = problem is None and not events
-        record = SessionRecord(
-            session=session,
-            rater=rater,
-            stage="not begun" if is_none else "unreadable",
+        return CheckedLog(
+            record=SessionRecord(
+                session=session,
+                rater=rater,
+                stage="not begun" if is_none else "unreadable",
+            ),
+            findings=findings,
+            log=log,
         )
-        return CheckedLog(record=record, findings=findings, log=log)
     checksum = hashlib.sha256(read_regular(file, most=MAX_SMALL)).hexdigest()
     return _against_schedule(study, protocol, schedule, events, state, checksum)
 
@@ -118,11 +121,13 @@ def check_rehearsal(study: StudyPaths, protocol: Protocol, log: Path) -> Checked
             )
     if state is None or problem is not None:
         name = log.stem.removeprefix("rehearsal_")
-        record = SessionRecord(
-            session=name, rater="", rehearsal=number, stage="unreadable"
+        return CheckedLog(
+            record=SessionRecord(
+                session=name, rater="", rehearsal=number, stage="unreadable"
+            ),
+            findings=[] if problem is None else [problem],
+            log=log,
         )
-        findings = [] if problem is None else [problem]
-        return CheckedLog(record=record, findings=findings, log=log)
     is_changed = state.header["presented_sha256"] != presented_hash(protocol)
     try:
         drawn = None if is_changed else drawn_rehearsal(paths, protocol, rater, session)
@@ -196,19 +201,22 @@ def _checked_session(
     recordings = [
         study.sessions / str(event.fields["recording"]) for event in state.all_presented
     ]
-    record = SessionRecord(
-        session=session,
-        rater=rater,
-        stage="complete" if state.is_complete else "begun",
-        n_presentations=n_presentations,
-        n_graded=len(state.grades),
-        n_skipped=len(state.skipped),
-        n_corrections=sum(event.kind == "correction" for event in events),
-        n_recordings=len(recordings),
-        rehearsal=study.number if isinstance(study, RehearsalPaths) else None,
+    return CheckedLog(
+        record=SessionRecord(
+            session=session,
+            rater=rater,
+            stage="complete" if state.is_complete else "begun",
+            n_presentations=n_presentations,
+            n_graded=len(state.grades),
+            n_skipped=len(state.skipped),
+            n_corrections=sum(event.kind == "correction" for event in events),
+            n_recordings=len(recordings),
+            rehearsal=study.number if isinstance(study, RehearsalPaths) else None,
+        ),
+        findings=findings,
+        log=study.log_file(rater, session),
+        recordings=recordings,
     )
-    log = study.log_file(rater, session)
-    return CheckedLog(record=record, findings=findings, log=log, recordings=recordings)
 
 
 def _event_findings(
@@ -258,8 +266,11 @@ def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedL
     rater = log.stem
     events, _, problem = checked_log(log, _read_training)
     if problem is not None:
-        record = SessionRecord(session="training", rater=rater, stage="unreadable")
-        return CheckedLog(record=record, findings=[problem], log=log)
+        return CheckedLog(
+            record=SessionRecord(session="training", rater=rater, stage="unreadable"),
+            findings=[problem],
+            log=log,
+        )
     head, of_study = events[0].fields, {"study": protocol.study.id, "rater": rater}
     findings = [*unlike(log, "line 1", of_study, head)]
     if head["presented_sha256"] != presented_hash(protocol):
@@ -278,15 +289,19 @@ def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedL
         shown = Presentation(position=place, code=code, model=model, repeat=place)
         findings += recording_findings(path, code, {code: shown}, of, event, log)
     ends = [event.fields["passed"] for event in events if event.kind == "complete"]
-    record = SessionRecord(
-        session="training",
-        rater=rater,
-        stage="begun" if not ends else "passed" if ends[0] else "not passed",
-        n_presentations=len({str(event.fields["position"]) for event in presented}),
-        n_graded=sum(event.kind == "grade" for event in events),
-        n_recordings=len(presented),
+    return CheckedLog(
+        record=SessionRecord(
+            session="training",
+            rater=rater,
+            stage="begun" if not ends else "passed" if ends[0] else "not passed",
+            n_presentations=len({str(event.fields["position"]) for event in presented}),
+            n_graded=sum(event.kind == "grade" for event in events),
+            n_recordings=len(presented),
+        ),
+        findings=findings,
+        log=log,
+        recordings=recordings,
     )
-    return CheckedLog(record=record, findings=findings, log=log, recordings=recordings)
 
 
 def _read_training(log: Path) -> tuple[tuple[Event, ...], None]:

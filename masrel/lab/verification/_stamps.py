@@ -3,6 +3,7 @@
 import hashlib
 import urllib.request
 from datetime import datetime
+from http.client import HTTPException
 from pathlib import Path
 from types import ModuleType
 from urllib.error import URLError
@@ -48,16 +49,17 @@ def request_stamp(file: Path, service: str) -> datetime:
     query = builder.hash_algorithm(client.HashAlgorithm.SHA256).build()
     if not service.startswith(("http://", "https://")):
         raise ParameterError(f"stamp: needed an address with http, got {service!r}")
-    request = urllib.request.Request(
-        service,
-        data=query.as_bytes(),
-        headers={"Content-Type": "application/timestamp-query"},
-    )
     try:
+        request = urllib.request.Request(
+            service,
+            data=query.as_bytes(),
+            headers={"Content-Type": "application/timestamp-query"},
+        )
         with urllib.request.urlopen(request, timeout=_WAIT_S) as answer:
             token = answer.read(MAX_SMALL)
-    except URLError as error:
-        raise ParameterError(f"stamp: {service}: {error.reason}") from error
+    except (OSError, HTTPException, ValueError) as error:  # of the address, or answer
+        reason = error.reason if type(error) is URLError else error
+        raise ParameterError(f"stamp: {service}: {reason}".strip()) from error
     time = _time_of(token, data, service)
     write_file(stamp_of(file), token)
     return time

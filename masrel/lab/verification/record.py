@@ -3,11 +3,11 @@
 import hashlib
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import masrel
 from masrel.errors import MasrelError, MasrelWarning, ProtocolError, SessionLogError
@@ -25,11 +25,10 @@ from masrel.lab._study_files import (
     read_regular,
 )
 from masrel.lab.conduct import excluded_raters, plan_changes
-from masrel.lab.conduct._plan_versions import version_problems
+from masrel.lab.conduct._plan_versions import is_of_earlier
 from masrel.lab.conduct._study_log import (
     allotment_problems,
     conduct_hash,
-    earlier_conduct_hashes,
     merged_log_problems,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
@@ -49,12 +48,10 @@ from masrel.lab.verification._sessions import (
     check_training,
 )
 
-if TYPE_CHECKING:
-    from masrel.lab.analysis import Analysis
-    from masrel.lab.ratings import Ratings
-
 _REPORT_FORMAT = "masrel report 2"  # what the manifest of a report says its format is
 _HASHED_NAMES = "masrel report 1"  # whose tables and figures have hashes in their names
+
+_OTHER = "was made of another protocol, other ratings or another log"
 
 _SHOWN = 20  # differences of the table that are listed
 
@@ -83,7 +80,7 @@ class Verification:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is broken; there may be doubts."""
+        """Whether nothing is broken; something may be stale, or a doubt."""
         return not any(finding.weight == "broken" for finding in self.findings)
 
 
@@ -156,9 +153,10 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
         check_session(study, protocol, session, rater)
         for rater, session in protocol.rater_sessions
     ]
-    training_logs = [study.training_log_file(rater.id) for rater in protocol.raters]
     trained = [
-        check_training(study, protocol, log) for log in training_logs if log.is_file()
+        check_training(study, protocol, log)
+        for rater in protocol.raters
+        if (log := study.training_log_file(rater.id)).is_file()
     ]
     rehearsed = [
         check_rehearsal(study, protocol, log)
@@ -182,7 +180,6 @@ def _conduct_findings(study: StudyPaths, protocol: Protocol) -> tuple[Finding, .
         return (
             *(broken(*problem) for problem in merged_log_problems(study)),
             *(broken(*problem) for problem in allotment_problems(study, protocol)),
-            *(broken(*problem) for problem in version_problems(study)),
             *(
                 finding
                 for log in study.conduct_logs()
@@ -253,140 +250,172 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
     files = [file for file in outputs if file.is_file()]
     if not files:
         return  # nothing is loaded for it
-    from masrel.lab.analysis import analyze
-    from masrel.lab.ratings import (
-        answers_of,
-        in_person_of,
-        ratings_from_logs,
-        read_study_data,
-    )
-    from masrel.lab.sealing import as_far_as_known
-
+    computed: dict[str, dict[str, str]] = {}
     try:
         if study.logs():
-            # recordings have been held against the logs before
-            ratings = ratings_from_logs(study, protocol, check_recordings=False)
-            yield from _table_findings(study, protocol, ratings)
-        else:
-            ratings = read_study_data(study, protocol).ratings
-            if table.is_file():
-                yield doubt(table, "no session log stands behind this table")
-        if not {study.analysis_file, manifest} & {*files}:
-            return
-        # of statistics
-        with warnings.catch_warnings(action="ignore", category=MasrelWarning):
-            analysis = analyze(
-                *as_far_as_known(protocol, ratings),
-                in_person=in_person_of(study, ratings),
-                answers=answers_of(study, protocol),
-                excluded=excluded_raters(study),
-            )
+            yield from _table_findings(study, protocol)
+        elif table.is_file():
+            yield doubt(table, "no session log stands behind this table")
+        if study.analysis_file.is_file():
+            yield from _numbers_findings(study, protocol, study.analysis_file, computed)
+        if manifest.is_file():
+            yield from _report_findings(study, protocol, manifest, computed)
     except MasrelError as error:
         for path in files:
             yield broken(path, f"cannot be held against what it is made from: {error}")
-        return
-    if study.analysis_file.is_file():
-        yield from _analysis_findings(study.analysis_file, analysis, ratings)
-    if manifest.is_file():
-        yield from _report_findings(study, manifest, analysis, ratings)
 
 
-def _table_findings(
-    study: StudyPaths, protocol: Protocol, ratings: "Ratings"
-) -> Iterator[Finding]:
-    from masrel.lab.progress import raters_csv
-    from masrel.lab.ratings import answers_csv, answers_from_logs
+def _table_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     from masrel.lab.ratings.study_data import _table_differences
-    from masrel.lab.ratings.table import _FORMAT, _texts
 
-    made: dict[Path, tuple[Callable[[], Iterable[str]], int]] = {
-        study.ratings_file: (lambda: _texts(ratings), _FORMAT),
-        study.answers_file: (
-            lambda: [answers_csv(answers_from_logs(study, protocol))],
-            1,
-        ),
-        study.raters_file: (lambda: [raters_csv(study, protocol)], 1),
-    }
-    for path, (texts, newest) in made.items():
-        if not path.is_file():
-            continue
-        differences = list(_table_differences(path, texts(), newest=newest))
+    for path in (study.ratings_file, study.answers_file, study.raters_file):
+        is_stale, differences = _table_differences(study, protocol, path)
         for difference in differences[:_SHOWN]:
-            yield broken(path, f"{difference}; masrel ratings writes it anew")
+            yield (stale if is_stale else broken)(
+                path, f"{difference}; masrel ratings writes it anew"
+            )
         if len(differences) > _SHOWN:
             yield broken(
                 path, f"there are {len(differences) - _SHOWN} more differences"
             )
 
 
-def _of_same_table(
-    analysis: "Analysis", ratings: "Ratings", inputs: Mapping[str, object]
-) -> "Analysis":
-    # with the hash that was written if it is of the same table in an earlier format
-    from masrel.lab.ratings.table import _texts
-
-    texts = _texts(ratings) if ratings.source_path is None else ()
-    for text in texts:
-        sha256 = hashlib.sha256(text.encode()).hexdigest()
-        if sha256 == inputs.get("ratings_sha256"):
-            changed = {**analysis.inputs, "ratings_sha256": sha256}
-            return replace(analysis, inputs=changed)
-    return analysis
-
-
-def _analysis_findings(
-    path: Path, analysis: "Analysis", ratings: "Ratings"
+def _numbers_findings(
+    study: StudyPaths,
+    protocol: Protocol,
+    path: Path,
+    computed: dict[str, dict[str, str]],
+    report: Mapping[str, object] | None = None,
 ) -> Iterator[Finding]:
-    from masrel.lab.analysis import as_analysis_document
+    # of an analysis, that of a report with what the manifest says that this is made of
     from masrel.lab.analysis._results import ANALYSIS_FORMAT
 
-    document = _document(path)
-    if document is None:
-        yield broken(path, "needed a JSON object, got none")
-        return
-    document = {"format": 1, **document}  # which was not said once
-    problem = format_problem(document["format"], newest=ANALYSIS_FORMAT)
-    if problem is not None:
-        yield broken(path, problem)
-        return
-    inputs = document.get("inputs")
-    if isinstance(inputs, dict):
-        analysis = _of_same_table(analysis, ratings, inputs)
-    needed = as_analysis_document(analysis)
-    if isinstance(inputs, dict) and inputs != needed["inputs"]:
-        made_of = "another protocol or other ratings"
-        yield stale(path, f"was made of {made_of}; masrel analyze makes it anew")
-        return
-    if document.get("masrel_version") != analysis.masrel_version:
-        yield _not_rebuilt(path, document)
-        document, needed = {"inputs": inputs}, {"inputs": needed["inputs"]}
-    made, of_now = (
-        dict(leaves(each, within=(dict, list))) for each in (document, needed)
+    numbers = _document(path)
+    problem = (
+        "needed a JSON object, got none"
+        if numbers is None
+        else format_problem(numbers.get("format", 1), newest=ANALYSIS_FORMAT)
     )
-    for place in (*of_now, *made):
-        got, value = (each.get(place, "absent") for each in (made, of_now))
-        if got != value:
-            message = f"{place} is {got:.60}, but {value:.60} when it is computed again"
-            yield broken(path, message)
-            return
+    if numbers is None or problem is not None:
+        yield broken(path, str(problem))
+        return
+    version, inputs = numbers.get("masrel_version"), report or numbers.get("inputs")
+    made_of = inputs if isinstance(inputs, Mapping) else {}
+    if version != masrel.__version__:
+        yield doubt(
+            path,
+            f"made by masrel {version}, not rebuilt by this, {masrel.__version__}: "
+            "only what it was made from is looked at",
+        )
+        numbers = {}
+    place, verb = (
+        (path, "analyze") if report is None else (path.with_name(MANIFEST), "report")
+    )
+    # an earlier version may have written ratings in another format
+    former = None if numbers else made_of.get("ratings_sha256")
+    seen: dict[str, object] = {}  # protocols that were tried, with what else was there
+
+    def difference(then: Protocol) -> str | None:
+        material, inputs = _material(study, then, former)
+        seen[inputs["protocol_sha256"]] = inputs.get("in_person_sha256")
+        conduct = None if report is None else conduct_hash(study)
+        beside = {} if conduct is None else {"conduct_sha256": conduct}
+        if inputs | beside != made_of:
+            return _OTHER
+        return (
+            _unlike(numbers, _leaves(material, inputs, computed)) if numbers else None
+        )
+
+    now, of = difference(protocol), str(made_of.get("protocol_sha256"))
+    if now is None:
+        return
+    # of what is made of the record as it is now, all else is another's
+    answers = {None: True, _OTHER: False if now == _OTHER else None}
+    if is_of_earlier(study, protocol, lambda p: answers.get(difference(p), False)):
+        weigh, now = stale, "is of an earlier state of the record"
+    elif study.logs() and seen.get(of, _OTHER) == made_of.get("in_person_sha256"):
+        weigh = broken
+    else:
+        weigh, now = stale, f"{now}, which no log has: it may have been made up"
+    yield weigh(place, f"{now}; masrel {verb} makes it anew")
 
 
-def _not_rebuilt(path: Path, document: Mapping[str, object]) -> Finding:
-    version = document.get("masrel_version")
-    return doubt(
-        path,
-        f"made by masrel {version}, not rebuilt by this, {masrel.__version__}: only "
-        "what it was made from is looked at",
+def _unlike(numbers: Mapping[str, object], needed: Mapping[str, str]) -> str | None:
+    # at what place, and how, an analysis differs from one that was computed again
+    made = dict(leaves({"format": 1, **numbers}, within=(dict, list)))
+    return next(
+        (
+            f"{place} is {made.get(place, 'absent'):.60}, but "
+            f"{needed.get(place, 'absent'):.60} when it is computed again"
+            for place in (*needed, *made)
+            if made.get(place) != needed.get(place)
+        ),
+        None,
     )
+
+
+def _material(
+    study: StudyPaths, protocol: Protocol, former: object
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return what a study is analysed from, by what its logs say, and the hashes of it.
+
+    Of ratings it is `former` where that is of the same table in another format.
+    """
+    from masrel.lab.analysis._plan import _inputs
+    from masrel.lab.ratings import (
+        answers_of,
+        in_person_of,
+        ratings_from_logs,
+        read_study_data,
+    )
+    from masrel.lab.ratings.table import _texts
+
+    if study.logs():  # recordings have been held against these before
+        ratings = ratings_from_logs(study, protocol, check_recordings=False)
+    else:
+        ratings = read_study_data(study, protocol, allows_sealed=True).ratings
+    in_person, answers = in_person_of(study, ratings), answers_of(study, protocol)
+    inputs = _inputs(protocol, ratings, in_person, answers)
+    texts = () if former is None or ratings.source_path else _texts(ratings)
+    if former in {hashlib.sha256(text.encode()).hexdigest() for text in texts}:
+        inputs["ratings_sha256"] = str(former)
+    return {
+        "protocol": protocol,
+        "ratings": ratings,
+        "in_person": in_person,
+        "answers": answers,
+        "excluded": excluded_raters(study),
+        "changes": plan_changes(study, protocol),
+    }, inputs
+
+
+def _leaves(
+    material: dict[str, Any],
+    inputs: Mapping[str, str],
+    computed: dict[str, dict[str, str]],
+) -> dict[str, str]:
+    """Return every place of the analysis of a study, computed once of what it is of."""
+    from masrel.lab.analysis import analyze, as_analysis_document
+
+    of = repr((inputs, material["excluded"], material["changes"]))
+    if of not in computed:
+        with warnings.catch_warnings(action="ignore", category=MasrelWarning):
+            analysis = analyze(**material)
+        document = as_analysis_document(replace(analysis, inputs=inputs))
+        computed[of] = dict(leaves(document, within=(dict, list)))
+    return computed[of]
 
 
 def _report_findings(
-    study: StudyPaths, manifest: Path, analysis: "Analysis", ratings: "Ratings"
+    study: StudyPaths,
+    protocol: Protocol,
+    manifest: Path,
+    computed: dict[str, dict[str, str]],
 ) -> Iterator[Finding]:
     # of the pages and assets that a report consists of, and what it was made from
-    document = _document(manifest)
-    files = None if document is None else document.get("files")
-    if document is None or not isinstance(files, dict):
+    document = _document(manifest) or {}
+    files, inputs = document.get("files"), document.get("inputs")
+    if not isinstance(files, dict) or not isinstance(inputs, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
         return
     if (of_format := document.get("format")) == _HASHED_NAMES:
@@ -399,27 +428,11 @@ def _report_findings(
         needed = f"needed format {_REPORT_FORMAT!r}, got {of_format!r}"
         yield broken(manifest, needed)
         return
+    beside = ("include", "claims_sha256")  # what is shown of the same, and of others
+    of = {key: value for key, value in inputs.items() if key not in beside}
     numbers = manifest.with_name("analysis.json")
-    made = _document(numbers) if numbers.is_file() else None
-    if made is not None and made.get("masrel_version") != masrel.__version__:
-        yield _not_rebuilt(numbers, made)
-    inputs = document.get("inputs")
-    of = dict(inputs) if isinstance(inputs, dict) else {}
-    of.pop("include", None)  # what is shown of the same
-    of_conduct = of.pop("conduct_sha256", None)
-    of_claims = of.pop("claims_sha256", None)
-    if of != _of_same_table(analysis, ratings, of).inputs:
-        yield stale(
-            manifest, "the report is of another protocol or of other ratings: make anew"
-        )
-    if of_conduct != conduct_hash(study):
-        is_earlier = of_conduct in earlier_conduct_hashes(study)
-        yield (stale if is_earlier else broken)(
-            manifest,
-            "the report is not of what has happened beside the sessions, by "
-            f"{study.conduct_file.name}: make anew",
-        )
-    claims = study.claims_file
+    yield from _numbers_findings(study, protocol, numbers, computed, of)
+    claims, of_claims = study.claims_file, inputs.get("claims_sha256")
     if of_claims and of_claims != (_sha256(claims) if claims.is_file() else None):
         yield broken(manifest, f"the report is of other claims than {claims.name}")
     yield from _file_findings(manifest, files)
@@ -443,6 +456,6 @@ def _sha256(path: Path) -> str:
 def _document(path: Path) -> dict[str, object] | None:
     try:
         document = parse_json(read_regular(path, most=MAX_TABLE))
-    except ValueError:
+    except (FileNotFoundError, ValueError):
         return None
     return document if isinstance(document, dict) else None

@@ -78,6 +78,11 @@ def test_a_draw_keeps_the_protocol_whose_hash_the_schedules_have(
             ),
         ),
         ('"A small study', '"Another small study', None),  # a title is no plan
+        (
+            "[report]",
+            '[[report.gates]]\nrequire = "kappa.low >= 0.4"\n[report]',
+            ("report.gates", None, '[{"require": "kappa.low >= 0.4", "why": ""}]'),
+        ),
     ],
 )
 def test_what_changes_after_the_draw_is_named_until_and_after_it_is_recorded(
@@ -88,6 +93,8 @@ def test_what_changes_after_the_draw_is_named_until_and_after_it_is_recorded(
     assert changed(study) == [(*each, False) for each in named]
     protocol = read_protocol(study.protocol)
     when = datetime(2026, 5, 1, tzinfo=UTC)
+    with study.conduct_file.open("ab") as log:
+        log.write(b'{"event": "amen')  # by a process that died
     recorded = record_amendment(
         study, protocol, who="MK", why="a reviewer asked", now=lambda: when
     )
@@ -96,7 +103,7 @@ def test_what_changes_after_the_draw_is_named_until_and_after_it_is_recorded(
         assert (each.who, each.why) == ("MK", "a reviewer asked")
         assert str(each) in " ".join(study_remarks(study, protocol))
     doubts = [f.message for f in verify_study(study).findings if f.weight == "doubt"]
-    assert sum(KAPPA.split(".")[0] in doubt for doubt in doubts) == len(named)
+    assert sum(each[0] in doubt for doubt in doubts for each in named) == len(named)
 
 
 def test_an_amendment_needs_a_draw_and_a_change(tmp_path: Path) -> None:

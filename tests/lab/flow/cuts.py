@@ -21,8 +21,9 @@ from typing import Any
 
 import pytest
 
+from masrel.lab._event_log import events_before_torn
 from masrel.lab._study_files import is_cut_off
-from masrel.lab.run import read_log
+from masrel.lab.run import Event, read_log
 
 NOTES = ".masrel_cache"  # of a report, beside it
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
@@ -38,6 +39,7 @@ _OPENS = ("open", "openat")
 _WRITES_TEXT = ("write", "writev", "pwrite64")  # which may name a folder
 
 Contents = dict[str, str]
+READY = "\n" * 200_000  # for as many copies of a study as there are
 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 
@@ -55,11 +57,18 @@ def events_and_contents(root: Path) -> Contents:
     logs = [path for path in _whole_files(root) if path.suffix == ".jsonl"]
     events = {
         str(log.relative_to(root)): "".join(
-            f"{event.kind} {dict(event.fields)}\n" for event in read_log(log)
+            f"{event.kind} {dict(event.fields)}\n"
+            for event in _whole_events(log)
+            if event.kind != "recovered"
         )
         for log in logs
     }
     return contents(root) | events
+
+
+def _whole_events(log: Path) -> tuple[Event, ...]:
+    before_torn = events_before_torn(log)  # of what was cut in the middle of a line
+    return read_log(log) if before_torn is None else before_torn
 
 
 def _whole_files(root: Path) -> Iterator[Path]:
@@ -68,7 +77,7 @@ def _whole_files(root: Path) -> Iterator[Path]:
         # a cache notes when its files were written; what it holds is sealed, and held
         # by tests/lab/flow/test_report_builds.py
         left_out = any(part.startswith((".masrel-", NOTES)) for part in places)
-        if path.is_file() and not left_out:
+        if path.is_file() and not left_out and path.suffix != ".torn":
             yield path
 
 
@@ -102,15 +111,15 @@ class Cuts:
     left: list[Contents] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.before = contents(self.root)
+        self.before = events_and_contents(self.root)
 
     def look(self, _: str) -> None:
-        self.left.append(contents(self.root))
+        self.left.append(events_and_contents(self.root))
         check_links(self.root)
 
     def check(self) -> None:
         """Every file is the old or the new one, at every moment."""
-        check_old_or_new(self.before, self.left, contents(self.root))
+        check_old_or_new(self.before, self.left, events_and_contents(self.root))
 
 
 def check_old_or_new(before: Contents, left: list[Contents], after: Contents) -> None:
@@ -182,14 +191,19 @@ class Syscall:
         fast = [] if what.startswith("signal") else ["-f", "--seccomp-bpf"]
         traced = ["strace", *fast, "-o", os.devnull, "-e", f"trace={self.name}"]
         traced += ["-e", f"inject={self.name}:{what}:when={self.place}"]
-        return subprocess.run([*traced, *command], capture_output=True, text=True)
+        return run_ready([*traced, *command])
+
+
+def run_ready(command: list[str]) -> subprocess.CompletedProcess[str]:
+    """Run a command; whoever it asks presses Enter."""
+    return subprocess.run(command, input=READY, capture_output=True, text=True)
 
 
 def syscalls_on(root: Path, log: Path, command: list[str]) -> list[Syscall]:
     """Return the calls of a command that change anything in a folder, in order."""
     traced = ["strace", "-f", "--seccomp-bpf", "-y", "-s", "4096", "-o", str(log)]
     traced += ["-e", f"trace={','.join(SYSCALLS)}"]
-    subprocess.run([*traced, *command], check=True, capture_output=True)
+    assert run_ready([*traced, *command]).returncode == 0
     counts: dict[str, int] = defaultdict(int)
     found, threads = [], set()
     lines = log.read_text(errors="replace").splitlines()

@@ -2,8 +2,10 @@
 
 import math
 import shutil
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -12,89 +14,53 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import MasrelError
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.ratings import read_study_data
+from masrel.lab.schedule._secret import find_secret
+from masrel.lab.verification import verify_study
 from tests.cli.process import Caller
 from tests.faults import Faults
+from tests.files import edit
+from tests.lab.authority import authority
 from tests.lab.flow.conftest import run
 from tests.lab.flow.cuts import (
+    READY,
     Contents,
     Cuts,
     Syscall,
     called_before,
     check_links,
     check_old_or_new,
-    contents,
     events_and_contents,
     full_disk_at,
     killed_by_strace,
     masrel_command,
+    run_ready,
     syscalls_on,
 )
 
 VERBS = ("init", "schedule", "ratings", "analyze", "report")
-LOGGING = ("note", "withdraw", "exclude", "include", "set", "unblind", "enter")
-OTHERS = (*LOGGING, "sheet", "checklist", "export", "merge")
+LOGGING = (
+    *("note", "adverse-event", "withdraw", "exclude", "include", "set", "unblind"),
+    *("enter", "amend", "day", "add", "unseal"),
+)
+RECORDING = (
+    *("schedule", "seal", "amend", "day", "set", "add", "adverse-event", "stamp"),
+    *("enter", "unseal", "merge"),
+)
+DRAWN_ON_THE_WAY = ("draw", "register")  # by a secret that is made then
+OTHERS = (
+    *(*LOGGING, "sheet", "checklist", "export", "merge", "seal", "stamp"),
+    *DRAWN_ON_THE_WAY,
+)
 
 
 def to_init(root: Path, _: Path) -> None:
     root.mkdir()
 
 
-def to_schedule(root: Path, study: Path) -> None:
-    # One schedule is stale and is drawn anew, one is there, one is not.
-    shutil.copytree(study, root)
-    for log in (root / "sessions").glob("*.jsonl"):
-        log.unlink()
-    protocol = root / "protocol.toml"
-    text = protocol.read_text()
-    assert "seed = " in text
-    protocol.write_text(text.replace("seed = ", "seed = 1", 1))
-    next(iter((root / "schedules").glob("*_R2.csv"))).unlink()
-
-
-def to_ratings(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    ratings = root / "ratings" / "ratings.csv"
-    ratings.write_text(ratings.read_text().replace(",simulated,", ",foreign,"))
-
-
-def to_analyze(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    (root / "analysis.json").write_text("{}\n")
-
-
-def to_report(root: Path, study: Path) -> None:
-    # Tables and figures of the new one differ from the old ones.
-    shutil.copytree(study, root)
-    protocol = root / "protocol.toml"
-    text = protocol.read_text().partition("[report]")[0]
-    protocol.write_text(f'{text}[report]\nsections = ["grades", "intended"]\n')
-    run("report", str(root), "--quiet")
-    sheet = root / "schedules" / "test_R2_sheet.csv"
-    code = sheet.read_text().splitlines()[-1].split(",")[1]
-    where = (str(root), "--rater", "R2", "--session", "test")
-    by = ("--who", "A", "--why", "b")
-    run("record", "correct", *where, "--code", code, "--grade", "4", *by)
-    run("ratings", str(root))
-
-
-def to_log(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    with (root / "protocol.toml").open("a", encoding="utf-8") as protocol:
-        protocol.write('\n[rater_fields.years]\ntype = "whole"\n')
-
-
-def to_include(root: Path, study: Path) -> None:
-    to_log(root, study)
-    run("record", "exclude", str(root), "--rater", "R2", *BY)
-
-
-def to_enter(root: Path, study: Path) -> None:
-    shutil.copytree(study, root)
-    shutil.rmtree(root / "sessions")
-    run("paper", "print", str(root))
-    typed = root / "sheets" / "test_R1.csv"
-    # a grade after the last comma of each row
-    typed.write_text(typed.read_text().replace(",\n", ",2\n"))
+def to_stamp(root: Path, study: Path) -> None:
+    shutil.copytree(study, root / "study")
 
 
 def to_merge(root: Path, study: Path) -> None:
@@ -112,32 +78,113 @@ def to_merge(root: Path, study: Path) -> None:
         shutil.rmtree(folder / "sessions" / f"test_{other}")
         for path in folder.glob(f"*/test_{other}*"):
             path.unlink()
-        run("record", "note", str(folder), f"the note of {site}", "--who", "Kim")
+        for event in AT_SITES:
+            run(*event.format(folder, rater).split())
 
 
-BY = ("--who", "Kim", "--why", "for a test")
+def to_others(verb: str, root: Path, study: Path) -> None:
+    without, edits, calls = BEFORE.get(verb, ((), FIELDS, ()))
+    shutil.copytree(study, root, ignore=shutil.ignore_patterns(*without))
+    for file, old, new in edits:
+        edit(root / file, old, new, 1)
+    for call in calls:
+        run(*call.format(root).split())
+    for typed in root.glob("sheets/*_R1.csv"):  # a grade at the end of each row
+        typed.write_text(typed.read_text().replace(",\n", ",2\n"))
+
+
+def in_protocol(*lines: str) -> tuple[tuple[str, str, str], ...]:
+    """The edit that puts tables into a protocol."""
+    return (("protocol.toml", "[report]", "\n".join([*lines, "[report]"])),)
+
+
+FIELDS = in_protocol("[rater_fields.years]", 'type = "whole"')
+SEALED = in_protocol("[blinding]", "sealed = true")
+RETEST = in_protocol(
+    *("[[sessions]]", 'id = "retest"', 'raters = ["R1"]', 'after = "test"'),
+    *("at_least_days = 7", 'order_policy = "warn"'),
+)
+GATE = in_protocol("[[report.gates]]", 'require = "kappa.low >= 0.4"')
+SECTIONS = (
+    ("protocol.toml", "[report]", '[report]\nsections = ["grades", "intended"]'),
+)
+MADE = ("ratings", "a*.json")
+DRAWN = ("sessions", "schedules", "*.jsonl", *MADE)
+RUN = "run {{0}} --rater {} --session {} --grades simulated --quiet"
+BY_R1, BY_R2, AGAIN = (
+    RUN.format(*of) for of in (("R1", "test"), ("R2", "test"), ("R1", "retest"))
+)
+PRINT = "paper print {{0}} --rater R1 --session {}"
+# What a study is without, what is put into its files, and what is called before
+BEFORE: dict[
+    str, tuple[tuple[str, ...], tuple[tuple[str, str, str], ...], tuple[str, ...]]
+] = {
+    # One schedule is stale and is drawn anew, one is there, one is not.
+    "schedule": (
+        ("test_*.jsonl", "test_R2.csv"),
+        (("protocol.toml", "seed = ", "seed = 1"),),
+        (),
+    ),
+    "ratings": ((), (("ratings/ratings.csv", ",simulated,", ",foreign,"),), ()),
+    "analyze": ((), (("analysis.json", "{", "{ "),), ()),
+    # Tables and figures of the new one differ from the old ones.
+    "report": (
+        (),
+        SECTIONS,
+        (
+            "report {0} --quiet",
+            "record correct {0} --rater R2 --session test --code 27B --grade 4 "
+            "--who A --why b",
+            "ratings {0}",
+        ),
+    ),
+    "include": ((), (), ("record exclude {0} --rater R2 --who Kim --why ill",)),
+    "amend": ((), GATE, ()),
+    "day": ((), RETEST, ("schedule {0}", AGAIN)),
+    "enter": ((), RETEST, ("schedule {0}", PRINT.format("retest"))),
+    "draw": (("published*", *DRAWN), (), ()),
+    "register": (("published*", *DRAWN), (), ()),
+    "seal": (DRAWN, SEALED, ()),
+    "run-sealed": (DRAWN, SEALED, ("schedule {0}", BY_R2)),
+    "unseal": (DRAWN, SEALED, ("schedule {0}", BY_R1, BY_R2)),
+    "run-paper": (("*_R1.jsonl", "test_R1", *MADE), (), (PRINT.format("test"),)),
+}
+AT_SITES = (
+    "record note {0} here --who Kim",
+    "record day {0} --rater {1} --session test --on 2024-05-01 --who Kim --why misread",
+    "record adverse-event {0} ill --on 2024-05-02 --onset 2024-05-01 --who Kim",
+    "record amend {0} --who Kim --why shorter",
+    "record rater add {0} --rater {1}b --session test --who Kim",
+)
 PREPARE: dict[str, Callable[[Path, Path], None]] = {
     "init": to_init,
-    "schedule": to_schedule,
-    "ratings": to_ratings,
-    "analyze": to_analyze,
-    "report": to_report,
-    **dict.fromkeys(OTHERS, to_log),
-    "include": to_include,
-    "enter": to_enter,
     "merge": to_merge,
+    "stamp": to_stamp,
 }
 CALLS = {
     "schedule": "schedule {0} --redraw",
     "report": "report {0} --quiet",
+    "draw": "schedule {0}",
+    "seal": "schedule {0}",
     "note": "record note {0} power-cut --who Kim",
-    "withdraw": "record withdraw {0} --rater R2 --who Kim --why left",
+    "adverse-event": "record adverse-event {0} fainted --who Kim --rater R1 "
+    "--on 2024-05-02 --onset 2024-05-01",
+    "amend": "record amend {0} --who Kim --why asked",
+    "day": "record day {0} --rater R1 --session test --on 2024-05-01 --who Kim "
+    "--why misread",
+    "add": "record rater add {0} --rater R3 --session test years=3 --who Kim",
+    "register": "record register {0} -o {0}/plan.json",
+    "unseal": "record unblind {0} --all --who Kim --why end",
+    "stamp": "verify {0}/study --anchor {0}/kept.txt --stamp {1}",
+    "run-paper": "run {0} --rater R1 --session test --grades paper --clock simulated",
+    "run-sealed": BY_R1,
+    "withdraw": "record withdraw {0} --rater R2 --who Kim --why left --on 2024-05-01",
     "exclude": "record exclude {0} --rater R2 --who Kim --why ill",
     "include": "record include {0} --rater R2 --who Kim --why well",
     "set": "record rater {0} --rater R2 years=12 --who Kim",
     "unblind": "record unblind {0} --all --who Kim --why end",
-    "enter": "paper enter {0} {0}/sheets/test_R1.csv --rater R1 --session test "
-    "--who Kim --on 2026-03-02",
+    "enter": "paper enter {0} {0}/sheets/retest_R1.csv --rater R1 --session retest "
+    "--who Kim --on 2024-05-08",
     "sheet": "paper print {0}",
     "checklist": "checklist {0} --guideline grras -o {0}/grras.html",
     "export": "export {0} --as bids -o {0}/bids --quiet",
@@ -145,16 +192,32 @@ CALLS = {
 }
 
 
+# What makes sessions that were run whole: the sheet is entered, all is unsealed
+THEN = {
+    "run-paper": "paper enter {0} {0}/sheets/test_R1.csv --rater R1 --session test "
+    "--who Kim",
+    "run-sealed": CALLS["unseal"],
+}
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of an authority that stamps times."""
+    with authority(tmp_path_factory.mktemp("authority")) as (address, _):
+        yield address
+
+
 @pytest.fixture
 def prepared(
-    small_demo: Path, tmp_path: Path
+    small_demo: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> Callable[[str], tuple[Path, list[str]]]:
     """Makes a study for a verb, and gives its folder and the call."""
 
     def make(verb: str) -> tuple[Path, list[str]]:
         root = tmp_path / verb
-        PREPARE[verb](root, small_demo / "study")
-        return root, CALLS.get(verb, f"{verb} {{0}}").format(root).split()
+        PREPARE.get(verb, partial(to_others, verb))(root, small_demo / "study")
+        address = request.getfixturevalue("service") if verb == "stamp" else None
+        return root, CALLS.get(verb, f"{verb} {{0}}").format(root, address).split()
 
     return make
 
@@ -171,10 +234,10 @@ def test_a_kill_at_any_call_leaves_old_bytes_or_new_ones(
     with called_before(cuts.look):
         run(*call)
     cuts.check()
-    assert contents(root) != cuts.before
+    assert events_and_contents(root) != cuts.before
     assert len(cuts.left) >= 5
     assert not list(root.rglob(".masrel-*"))
-    assert contents(root) == cuts.left[-1]  # what comes last is a sync of the folder
+    assert events_and_contents(root) == cuts.left[-1]  # a sync comes last
 
 
 @pytest.mark.parametrize("verb", ["init", "schedule", "ratings"])
@@ -184,10 +247,10 @@ def test_a_full_disk_at_any_call_is_said_with_the_file(
     root, call = prepared(verb)
     kept = tmp_path / "kept"
     shutil.copytree(root, kept)
-    before = contents(root)
+    before = events_and_contents(root)
     with full_disk_at(0) as calls:
         assert masrel(*call).code == 0
-    after = contents(root)
+    after = events_and_contents(root)
     places = range(1, len(calls) + 1)
     for place in Random(7).sample(places, min(10, len(places))):
         shutil.rmtree(root)
@@ -196,12 +259,12 @@ def test_a_full_disk_at_any_call_is_said_with_the_file(
             done = masrel(*call)
         assert done.code == 2
         check_disk_is_said_full(root, done.err)
-        check_old_or_new(before, [contents(root)], after)
+        check_old_or_new(before, [events_and_contents(root)], after)
 
 
 def check_disk_is_said_full(root: Path, err: str) -> None:
     *notes, said = err.splitlines()
-    assert all(note.startswith(("note: ", "read: ")) for note in notes)
+    assert all(note.startswith(("note: ", "read: ", "anchors: ")) for note in notes)
     assert "No space left on device" in said
     assert str(root) in said
     assert ".masrel-" not in said
@@ -220,27 +283,57 @@ class Traced:
     before: Contents = field(default_factory=dict)
     after: Contents = field(default_factory=dict)
 
+    @property
+    def name(self) -> str:
+        """What is called, of a command with several rows."""
+        return CALLS.get(self.verb, self.verb).partition(" {0}")[0]
+
     def restore(self) -> None:
         shutil.rmtree(self.root)
         shutil.copytree(self.kept, self.root)
 
+    def seen(self) -> Contents:
+        """The files; of what is drawn on the way, or stamped, only that it is there."""
+        there = events_and_contents(self.root)
+        drawn = (".key", "schedules") if self.verb in DRAWN_ON_THE_WAY else ()
+        for path in there:
+            if path.startswith(drawn) or path.endswith(".tsr"):
+                there[path] = "made"
+        if (plan := self.root / "plan.json").exists():
+            key = find_secret(StudyPaths(self.root))
+            there[plan.name] = str(
+                key is not None and key.commitment in plan.read_text()
+            )
+        return there
+
+    def finished(self) -> Contents:
+        """What is rated in the end, whatever the way to it."""
+        run(*THEN[self.verb].format(self.root).split())
+        study = StudyPaths(self.root)
+        assert verify_study(study).is_whole
+        table = read_study_data(study, read_protocol(study.protocol)).ratings.table
+        return {"": table.drop(columns=["graded_at", "n_attempts"]).to_csv()}
+
     def check(self) -> None:
         """All files are old or new, and the same call again makes all of them new."""
-        left = events_and_contents(self.root)
-        check_old_or_new(self.before, [left], self.after)
+        left = self.seen()
+        is_session = self.verb in THEN
+        check_old_or_new(self.before, [left], left if is_session else self.after)
         check_links(self.root)
         is_made = (self.root / "protocol.toml").exists()
         if self.verb == "init" and is_made:  # which is not made again
             assert left == self.after
             return
-        again = CliRunner().invoke(cli, self.call)
+        again = CliRunner().invoke(cli, self.call, input=READY)
         if left == self.after and self.verb in OTHERS:
             # it is recorded once more, or refused as recorded before
-            check_old_or_new(left, [left], events_and_contents(self.root))
+            check_old_or_new(left, [left], self.seen())
             assert isinstance(again.exception, SystemExit | MasrelError | None)
         else:
             assert again.exit_code == 0, again.output
-            assert events_and_contents(self.root) == self.after
+            assert (self.finished() if is_session else self.seen()) == self.after
+        if self.verb in DRAWN_ON_THE_WAY:
+            run("check", str(self.root))  # orders are those that the secret draws
 
 
 @pytest.fixture
@@ -252,11 +345,11 @@ def traced(prepared: Prepared, tmp_path: Path) -> Callable[[str], Traced]:
     def make(verb: str) -> Traced:
         root, call = prepared(verb)
         traced = Traced(verb, root, tmp_path / "kept", call)
-        traced.before = events_and_contents(root)
+        traced.before = traced.seen()
         shutil.copytree(root, traced.kept)
         command = masrel_command(*call)
         traced.syscalls = syscalls_on(root, tmp_path / "log", command)
-        traced.after = events_and_contents(root)
+        traced.after = traced.finished() if verb in THEN else traced.seen()
         assert traced.after != traced.before
         return traced
 
@@ -278,7 +371,7 @@ EVERY = pytest.mark.parametrize(
         ),
         *(
             pytest.param(verb, 1.0, marks=[pytest.mark.long, pytest.mark.faults])
-            for verb in (*VERBS, *OTHERS)
+            for verb in (*VERBS, *OTHERS, *THEN)
         ),
     ],
 )
@@ -291,7 +384,8 @@ def test_a_kill_at_every_system_call(
     made = traced(verb)
     for syscall in some(made.syscalls, share):
         made.restore()
-        with faults(f"`{verb}` killed at a system call that changes a file"):
+        kind = f"`{made.name}` killed at a system call that changes a file"
+        with faults(kind):
             killed_by_strace(syscall, masrel_command(*made.call))
             made.check()
 
@@ -304,11 +398,43 @@ def test_a_full_disk_at_every_system_call(
     needs_space = [syscall for syscall in made.syscalls if syscall.needs_space]
     for syscall in some(needs_space, share):
         made.restore()
-        with faults(f"`{verb}` with a full disk at a system call that needs space"):
+        kind = f"`{made.name}` with a full disk at a system call that needs space"
+        with faults(kind):
             done = syscall.inject("error=ENOSPC", masrel_command(*made.call))
             if verb == "report" and done.returncode == 0:  # of its cache alone
                 assert events_and_contents(made.root) == made.after
             else:
                 assert done.returncode == 2, done.stderr
                 check_disk_is_said_full(made.root, done.stderr)
+            made.check()
+
+
+@pytest.mark.parametrize(
+    ("verb", "n_kills"),
+    [
+        *(pytest.param(verb, 2, marks=pytest.mark.slow) for verb in ("add", "unseal")),
+        *(
+            pytest.param(verb, 20, marks=[pytest.mark.long, pytest.mark.faults])
+            for verb in (*RECORDING, *DRAWN_ON_THE_WAY, *THEN)
+        ),
+    ],
+)
+def test_a_kill_at_a_random_moment_of_what_draws_records_or_runs(
+    verb: str, n_kills: int, prepared: Prepared, tmp_path: Path, faults: Faults
+) -> None:
+    root, call = prepared(verb)
+    copies = [tmp_path / f"copy{n}" for n in range(n_kills + 1)]
+    for copy in copies:
+        shutil.copytree(root, copy)
+    calls = [[part.replace(str(root), str(copy)) for part in call] for copy in copies]
+    template = " ".join(call).replace(str(root), "{0}")
+    command = [sys.executable, "-m", "tests.lab.run.kill_at", "call", "5", template]
+    done = run_ready([*command, *map(str, copies)])
+    assert done.returncode == 0, done.stderr
+    kept = Traced(verb, root, root, call)
+    whole = Traced(verb, copies[0], root, calls[0])
+    after = whole.finished() if verb in THEN else whole.seen()
+    for copy, its_call in zip(copies[1:], calls[1:], strict=True):
+        with faults("a draw, an event or a session killed at random, and called again"):
+            made = Traced(verb, copy, root, its_call, before=kept.seen(), after=after)
             made.check()

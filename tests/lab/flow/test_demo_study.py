@@ -6,12 +6,6 @@
 import json
 from pathlib import Path
 
-import pytest
-
-from masrel.lab.protocol import StudyPaths
-from masrel.lab.verification import verify_study
-from tests.lab.flow.conftest import run
-
 
 def test_the_report_and_every_table_say_simulated(small_demo: Path) -> None:
     report = small_demo / "report-simulated"
@@ -24,9 +18,3 @@ def test_the_report_and_every_table_say_simulated(small_demo: Path) -> None:
     _, conduct = (report / "report.md").read_text().split("## Conduct\n")
     assert "| 2012-01-01 | adverse-event | R1 | test | simulated: sore " in conduct
     assert "**Simulated data.** What happened beside the sessions" in conduct
-
-
-@pytest.mark.slow
-def test_a_study_whose_orders_have_rows_is_run_too(tmp_path: Path) -> None:
-    run("demo", str(tmp_path / "out"), "--study", "two-sites", "--quiet")
-    assert verify_study(StudyPaths(tmp_path / "out" / "study")).is_whole

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.lab.conduct import record_standing
+from masrel.lab.conduct import Note, record_note, record_standing
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.run import record_correction
 from masrel.lab.verification import (
@@ -20,6 +20,7 @@ from masrel.lab.verification import (
     verify_study,
     write_anchors,
 )
+from tests.files import edit
 from tests.lab.flow.conftest import run
 
 Events = list[dict[str, dict[str, object]]]
@@ -135,11 +136,25 @@ def with_models_that_change_places(schedule: Path) -> Path:
     return schedule.parent.parent
 
 
-def before_a_withdrawal(table: Path) -> Path:
-    study = StudyPaths(table.parent.parent)
+def withdrawn(study: StudyPaths) -> None:
     protocol = read_protocol(study.protocol)
     record_standing(study, protocol, "R2", "withdrawn", who="Kim", why="left")
-    return table
+
+
+def noted(study: StudyPaths) -> None:
+    note = Note(text="a power cut", who="Kim")
+    record_note(study, read_protocol(study.protocol), note)
+
+
+def planned_otherwise(study: StudyPaths) -> None:
+    edit(study.protocol, '"percent_agreement"', '"gwet_ac"')
+
+
+def rated_by_one_more(study: StudyPaths) -> None:
+    root, of_rater = str(study.root), ("--rater", "R3", "--session", "test")
+    run("record", "rater", "add", root, *of_rater, "--who", "Kim")
+    run("schedule", root)
+    run("run", root, *of_rater, "--grades", "simulated", "--quiet")
 
 
 def corrected(study: StudyPaths) -> None:
@@ -151,14 +166,6 @@ def corrected(study: StudyPaths) -> None:
     )
 
 
-def before_a_correction(manifest: Path) -> Path:
-    study = StudyPaths(manifest.parent.parent)
-    corrected(study)
-    for verb in ("ratings", "analyze"):
-        run(verb, str(study.root))
-    return manifest
-
-
 RECORDING, FACTS = "test_R1/*.npz", "test_R1/*.json"
 FORGERIES: list[tuple[str, Forgery]] = [
     (TABLE, with_another_grade),
@@ -166,12 +173,10 @@ FORGERIES: list[tuple[str, Forgery]] = [
     (TABLE, replaced(b"simulated", b"recorded")),
     (TABLE, replaced(b"# SIMULATED", b"# Recorded")),
     (RATERS, replaced(b"R2,NA,complete", b"R2,NA,planned")),
-    (RATERS, before_a_withdrawal),
     ("analysis.json", replaced(b'"value": 0.', b'"value": 0.9')),
     ("schedules/test_R1.csv", with_models_that_change_places),
     ("report/report.html", replaced(b"<p>", b"<p> ")),
     ("report/tables/*", gone),
-    ("report/manifest.json", before_a_correction),
     (SESSION, gone_with_what_it_names),
     (SESSION, emptied),
     (SESSION, without_line(3)),
@@ -257,6 +262,36 @@ def test_a_forgery_that_leaves_the_chain_is_found(
 ) -> None:
     place = forge(sorted(study.root.glob(file))[0])
     assert any(path.is_relative_to(place) for path in broken(study))
+
+
+ANALYSIS, REPORT = "analysis.json", "report/manifest.json"
+
+
+@pytest.mark.parametrize(
+    ("later", "made_before"),
+    [
+        (noted, [REPORT]),
+        (withdrawn, [RATERS, REPORT]),
+        (corrected, [TABLE, ANALYSIS, REPORT]),
+        (planned_otherwise, [ANALYSIS, REPORT]),
+        (rated_by_one_more, [TABLE, RATERS, ANALYSIS, REPORT]),
+    ],
+)
+def test_what_is_out_of_date_is_stale_and_is_made_anew(
+    study: StudyPaths, later: Callable[[StudyPaths], None], made_before: list[str]
+) -> None:
+    later(study)
+    findings = [f for f in verify_study(study).findings if f.weight != "doubt"]
+    of = [(f.path.relative_to(study.root).as_posix(), f.weight) for f in findings]
+    assert of == [(name, "stale") for name in made_before]
+    shown = run("verify", str(study.root), code=1)
+    assert f"masrel: {study.root}: {len(made_before)} out of date" in shown
+    run("check", str(study.root))
+    is_said = f"{study.ratings_file}: is out of date" in run("analyze", str(study.root))
+    assert is_said == (TABLE in made_before)
+    for verb in ("ratings", "report"):
+        run(verb, str(study.root))
+    run("verify", str(study.root))
 
 
 def test_a_rehearsal_of_another_number_is_found(study: StudyPaths) -> None:
@@ -379,12 +414,12 @@ def test_lines_that_no_anchor_covers_are_said(
 
     said(old, 0)
     assert "no anchor" not in said(old, 0)
-    corrected(study)  # the table of ratings is older now, which is broken
+    corrected(study)  # what was made before is out of date now
     n = len(anchors_of(study))
-    assert f"note: 1 of {n} logs have lines that no anchor in {old} " in said(old, 2)
-    said(new, 2)
+    assert f"note: 1 of {n} logs have lines that no anchor in {old} " in said(old, 1)
+    said(new, 1)
     new.write_text(old.read_text() + new.read_text())
-    assert "no anchor" not in said(new, 2)
+    assert "no anchor" not in said(new, 1)
 
 
 def test_the_verb_says_every_session_and_ends_with_2_when_broken(

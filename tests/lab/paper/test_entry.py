@@ -4,7 +4,7 @@ import csv
 import io
 import random
 from collections.abc import Callable, Sequence
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -265,7 +265,7 @@ def test_a_sheet_is_entered_once_and_into_no_session_of_the_console(
     before = small[0].log_file("R1", "test").read_bytes()
     for again in (file, typed(small, filled(small, "2", "2", "3"), name="b.csv")):
         with pytest.raises(SessionLogError) as caught:
-            enter(small, again, on=date(2026, 5, 1))  # nor its day
+            enter(small, again, on="2026-05-01")  # nor its day
         assert str(caught.value).startswith(
             f"{again}: row 2: needed a presentation that was not entered yet, got "
             "position 1, code "
@@ -310,9 +310,7 @@ def test_days_between_sessions_are_counted_from_the_days_on_the_sheets(
 ) -> None:
     small = study, protocol = new_study(('id = "retest"\nraters = ["R1"]', AFTER))
     now = lambda: datetime(2026, 11, 22, 9, tzinfo=UTC)  # noqa: E731
-    enter(
-        small, typed(small, filled(small, "1", "2", "3")), on=date(2026, 11, 1), now=now
-    )
+    enter(small, typed(small, filled(small, "1", "2", "3")), on="2026-11-01", now=now)
     file = typed(small, filled(small, "1", "2", "3", session="retest"), name="b.csv")
     with pytest.warns(
         MasrelWarning, match="at least 14 days after session test, got 9"
@@ -324,7 +322,7 @@ def test_days_between_sessions_are_counted_from_the_days_on_the_sheets(
             "R1",
             "retest",
             who="MK",
-            on=date(2026, 11, 10),
+            on="2026-11-10",
             now=now,
         )
     kinds = {e.kind: e.fields for e in read_log(study.log_file("R1", "retest"))}

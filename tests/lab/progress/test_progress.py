@@ -62,13 +62,16 @@ def test_a_session_is_drawn_begun_and_complete(small: Small) -> None:
     assert not [m.id for m in protocol.models if m.id in repr((of_r1, of_r2, retest))]
 
 
-def test_a_damaged_log_is_said_and_hides_no_other_session(small: Small) -> None:
-    study, _ = small
+def test_a_damaged_log_is_said_and_hides_no_other_session(
+    new_study: Callable[..., Small],
+) -> None:
+    small = study, _ = new_study(('id = "retest"', 'id = "retest"\nafter = "test"'))
     run(small, "R1")
     run(small, "R2")
     log = study.log_file("R1", "test")
     log.write_bytes(log.read_bytes().replace(b'"attempt": 1', b'"attempt": 2'))
-    of_r1, of_r2, _ = session_progress(*small)
+    of_r1, of_r2, retest = session_progress(*small)
+    assert retest.stage == "drawn"  # after the one that is damaged
     assert of_r1.stage == "unreadable"
     assert "needed previous" in str(of_r1.problem)
     assert of_r2.stage == "complete"

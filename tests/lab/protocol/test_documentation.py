@@ -9,6 +9,7 @@ import pytest
 
 from masrel.lab import protocol as definition
 from masrel.lab.protocol import Protocol, read_protocol, report_sections
+from masrel.lab.protocol.definition import Blinding
 
 PAGE = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
 
@@ -25,6 +26,7 @@ TABLES = {
     "[stretch]": definition.Stretch,
     "[presentation]": definition.PresentationRules,
     "[occasions]": definition.Occasions,
+    "[blinding]": Blinding,
     "[[questionnaires]]": definition.Questionnaire,
     "[[questionnaires.questions]]": definition.Question,
     "[device]": definition.DeviceSettings,

@@ -3,7 +3,10 @@
 ``line N_BYTES ROOT...``: in the nth copy while its nth line of the log is written,
 after so many bytes of it. ``moment SEED WHOLE ROOT...``: at a tick of the loop that is
 drawn, or, each fourth, at a call that changes a file, of so many as the session that is
-run in WHOLE has. Each copy has a process of its own, forked from this one.
+run in WHOLE has. ``call SEED COMMAND WHOLE ROOT...``: the same of a command, in which
+``{0}`` is the folder; where it has no loop always at a call that changes a file, each
+other time in the middle of what is written. Each copy has a process of its own, forked
+from this one.
 """
 
 import json
@@ -12,8 +15,10 @@ import random
 import signal
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+from masrel.cli import cli
 from masrel.lab.hess import SimulatedClock
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.run import SimulatedGrades, run_session
@@ -43,14 +48,18 @@ def die_at_line(fatal: int, n_bytes: int, die: Callable[[], object] = die) -> No
     os.write = write_or_die
 
 
-def die_at_moment(kind: str, fatal: int | None) -> dict[str, int]:
+def die_at_moment(
+    kind: str, fatal: int | None, *, tears: bool = False
+) -> dict[str, int]:
     """Count ticks and calls that change a file, and die at one of them -> how many."""
-    n = {"tick": 0, "file": 0}
+    n, write = {"tick": 0, "file": 0}, os.write
 
     def counting(of: str, call: Callable[..., object]) -> Callable[..., object]:
         def counted(*arguments: object, **options: object) -> object:
             n[of] += 1
             if of == kind and n[of] == fatal:
+                if tears and call is write:
+                    write(arguments[0], arguments[1][: len(arguments[1]) // 2])
                 die()
             return call(*arguments, **options)
 
@@ -71,33 +80,43 @@ def session(root: Path) -> None:
     run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
 
 
-def forked(root: Path, prepare: Callable[..., object], *arguments: object) -> int:
-    """Run the session in another process -> how that ended."""
+def command(call: str, root: Path) -> None:
+    """Call the command line."""
+    cli.main(call.format(root).split(), standalone_mode=False)
+
+
+def forked(
+    act: Callable[[Path], None], root: Path, prepare: Callable[[], object]
+) -> int:
+    """Do it in another process -> how that ended."""
     process = os.fork()
     if process == 0:
-        n = prepare(*arguments)
-        session(root)
-        (root / "counts").write_text(json.dumps(n))
+        n = prepare()
+        act(root)
+        root.with_suffix(".counts").write_text(json.dumps(n))
         os._exit(0)
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
-def main(mode: str, number: int, *roots: Path) -> None:
+def main(mode: str, number: int, act: Callable[[Path], None], *roots: Path) -> None:
     """Die in each copy."""
     drawn, n = random.Random(number), {"tick": 0, "file": 0}
-    if mode == "moment":
+    if mode != "line":
         whole, *roots = roots
-        if forked(whole, die_at_moment, "tick", None):
+        if forked(act, whole, partial(die_at_moment, "tick", None)):
             sys.exit("the whole session failed")
-        n = json.loads((whole / "counts").read_text())
+        n = json.loads(whole.with_suffix(".counts").read_text())
     for index, root in enumerate(roots):
-        kind = "tick" if index % 4 else "file"
-        how = (die_at_line, index + 1, number)
-        if mode == "moment":
-            how = (die_at_moment, kind, drawn.randint(1, n[kind]))
-        if (status := forked(root, *how)) != -signal.SIGKILL:
+        kind = "tick" if index % 4 and n["tick"] else "file"
+        how = partial(die_at_line, index + 1, number)
+        if mode != "line":
+            tears = mode == "call" and index % 2 == 0
+            how = partial(die_at_moment, kind, drawn.randint(1, n[kind]), tears=tears)
+        if (status := forked(act, root, how)) != -signal.SIGKILL:
             sys.exit(f"{root}: ended with {status}, not killed at {how}")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), *map(Path, sys.argv[3:]))
+    mode, number, *rest = sys.argv[1:]
+    act = partial(command, rest.pop(0)) if mode == "call" else session
+    main(mode, int(number), act, *map(Path, rest))

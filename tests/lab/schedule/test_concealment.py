@@ -216,3 +216,6 @@ def test_two_secrets_in_one_study_are_refused(tmp_path: Path) -> None:
     with_secret(study)
     with pytest.raises(ScheduleError, match=r"needed the secret of .*secret.txt"):
         write_schedules(protocol_of(raters=("R1", "R2", "R3")), study)
+    study.published_secret_file.replace(study.secret_file)
+    with pytest.raises(ScheduleError, match=r"secret of test_R1.csv, whose commitment"):
+        write_schedules(protocol_of(raters=("R1", "R2", "R3")), study)

@@ -78,8 +78,9 @@ def test_what_cannot_be_is_one_sentence(study: StudyPaths) -> None:
             assert (status, why in body["why"]) == (422, True), body
             assert "\n" not in body["why"]
 
+    before = study.conduct_file.read_bytes()
     with_tablets(study, run, coordinated=True)
-    assert not study.conduct_file.exists()
+    assert study.conduct_file.read_bytes() == before
 
 
 def screens(events: list[tuple[str, Any]]) -> set[str]:
@@ -338,12 +339,14 @@ CASES: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
         {
             **{"text": "wrist hurts", "who": "Kim", "kind": "adverse-event"},
             **{"severity": "mild", "rater": "R1", "session": "test"},
-            **{"action": "a break", "outcome": ""},
+            **{"action": "a break", "outcome": "", "relatedness": "possible"},
+            **{"seriousness": "not serious", "onset": "2026-01-05"},
         },
         (
             *("record adverse-event", "wrist hurts", "--who", "Kim"),
             *("--severity", "mild", "--rater", "R1", "--session", "test"),
-            *("--action", "a break"),
+            *("--action", "a break", "--relatedness", "possible"),
+            *("--seriousness", "not serious", "--onset", "2026-01-05"),
         ),
     ),
     "note": (
@@ -353,8 +356,8 @@ CASES: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
     ),
     "withdraw": (
         "withdraw",
-        {"rater": "R2", **BY},
-        ("record withdraw", "--rater", "R2", *BY_KIM),
+        {"rater": "R2", "on": "2026-01-05", **BY},
+        ("record withdraw", "--rater", "R2", "--on", "2026-01-05", *BY_KIM),
     ),
     "unblind": (
         "unblind",
@@ -384,6 +387,11 @@ CASES: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
             *("record correct", *OF_VERB_R2),
             *("--code", "FAULTED", "--grade", "4"),
         ),
+    ),
+    "day": (
+        "day",
+        {**OF_R1, "on": "2026-01-05"},
+        ("record day", *OF_VERB_R1, "--on", "2026-01-05"),
     ),
     "answer about a session": (
         "answer",
@@ -442,6 +450,11 @@ REFUSALS: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
         "unblind",
         {"code": "XX", **BY},
         ("record unblind", "XX", *BY_KIM),
+    ),
+    "no day": (
+        "day",
+        {**OF_R1, "on": "5 May"},
+        ("record day", *OF_VERB_R1, "--on", "5 May"),
     ),
     "no fault": (
         "skip",

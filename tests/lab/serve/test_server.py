@@ -287,10 +287,11 @@ def test_what_cannot_be_served_is_said(
 ) -> None:
     protocol = study / "protocol.toml"
     text = protocol.read_text()
-    protocol.write_text("models = 3")
-    done = masrel("serve", study)
-    assert (done.code, "protocol.toml" in done.err) == (2, True)
-    assert not (study / ".key").exists()
+    for wrong in ("models = 3", text.replace("fleiss_kappa", "fleis_kappa")):
+        protocol.write_text(wrong)
+        done = masrel("serve", study)
+        assert (done.code, "protocol.toml" in done.err) == (2, True)
+        assert not (study / ".key").exists()
     protocol.write_text(text)
     with listen("127.0.0.1", 0) as other:
         done = masrel("serve", study, "--port", other.getsockname()[1])

@@ -148,17 +148,22 @@ function table(headings, rows) {
 
 const time = (utc) => (utc ? momentOf(utc) : "");
 
+/** On which days a session may begin. */
+const dueWords = ({ first, last, is_overdue: isOverdue }) =>
+  [first && `from ${first}`, last && `to ${last}`, isOverdue && "(overdue)"].filter(Boolean).join(" ");
+
 function showStudy() {
   const { overview } = state;
   const status = Object.fromEntries(overview.raters.map((each) => [each.rater, each.status]));
   const gone = (rater) => (["withdrawn", "excluded"].includes(status[rater]) ? ` (${status[rater]})` : "");
   at("sessions").replaceChildren(
     table(
-      ["Session", "Rater", "Stage", "Faults", "Last event"],
+      ["Session", "Rater", "Stage", "Day", "Faults", "Last event"],
       overview.sessions.map((each) => [
         each.session,
         each.rater + gone(each.rater),
         each.problem ?? stage(each),
+        each.held_on ?? (gone(each.rater) ? "" : dueWords(each.due)),
         String(each.n_faults),
         time(each.last_time_utc),
       ]),
@@ -207,8 +212,9 @@ function showDevice({ device, n_torque_problems: n }) {
 const nextSaid = outcome();
 
 /** What to press for the next step; null where this page has no act for it. */
-function nextAct({ verb, rater, session }, stage) {
-  if (verb === "run") return [stage === "begun" ? "Go on with it" : "Start it", "start", { rater, session }];
+function nextAct({ verb, command, rater, session }, stage) {
+  if (command.includes("--grades paper")) return null;
+  if (["run", "serve"].includes(verb)) return [stage === "begun" ? "Go on with it" : "Start it", "start", { rater, session }];
   if (verb === "schedule") return ["Draw the missing schedules", "draw", {}];
   return verb in jobWords ? [jobWords[verb], "job", { verb }] : null;
 }
@@ -217,7 +223,7 @@ function showNext() {
   const { desk, overview } = state;
   if (!desk || !overview) return;
   const { next, problem } = overview;
-  const isRunning = Boolean(desk.session) && next?.verb === "run"; // nothing else can be started
+  const isRunning = Boolean(desk.session) && ["run", "serve"].includes(next?.verb); // nothing else can be started
   const its = (each) => each.rater === next?.rater && each.session === next?.session;
   const stage = overview.sessions.find(its)?.stage;
   const which = JSON.stringify([next, problem, isRunning, stage]);
@@ -444,7 +450,7 @@ function draw() {
   const x = (t) => 48 + ((t - start) / (end - start)) * (width - 60);
   const isSealed = Boolean(state.overview?.sealed); // then nothing says what is felt
   if (!isSealed) shadePhases(g, x, height);
-  chart(g, x, { low: 0, high: 180, step: 45, top: 18, bottom: height / 2 - 12, values: live.angle_deg, label: "Angle, deg", width });
+  chart(g, x, { low: 0, high: 180, step: 45, top: 18, bottom: isSealed ? height - 22 : height / 2 - 12, values: live.angle_deg, label: "Angle, deg", width });
   const most = Math.max(5, ...live.torque_nm.map(Math.abs)) * 1.1;
   const step = most > 12 ? 5 : 2.5;
   if (!isSealed) chart(g, x, { low: -most * 0.25, high: most, step, top: height / 2 + 18, bottom: height - 22, values: live.torque_nm, label: "Torque, N·m", width });
@@ -455,7 +461,7 @@ function draw() {
   g.fillText(`${start.toFixed(1)} s`, 48, height - 6);
   if (live.time_s.length) {
     const phase = phases[live.phase.at(-1)] ?? "";
-    const felt = isSealed ? "" : `, torque ${live.torque_nm.at(-1).toFixed(1)} N·m, ${phase}`;
+    const felt = isSealed ? "; the study is sealed, so its torque is not shown" : `, torque ${live.torque_nm.at(-1).toFixed(1)} N·m, ${phase}`;
     at("live-text").textContent = `Angle ${live.angle_deg.at(-1).toFixed(0)} deg${felt}.`;
   }
 }
