@@ -54,13 +54,15 @@ class Case:
 
 def by_a_person(study: Study) -> None:
     rater = "R2" if study[0].log_file("R1", "test").exists() else "R1"
-    grades = console("\n1\n" * 5)[0]
-    run.run_session(*study, rater, "test", grades=grades, clock="simulated")
+    run.run_session(
+        *study, rater, "test", grades=console("\n1\n" * 5)[0], clock="simulated"
+    )
 
 
 def on_paper(study: Study) -> None:
-    rows = filled(study, "1", "2", "3")
-    paper.enter_sheet(*study, typed(study, rows), "R1", "test", who="JL")
+    paper.enter_sheet(
+        *(*study, typed(study, filled(study, "1", "2", "3")), "R1", "test"), who="JL"
+    )
 
 
 def amend(study: Study) -> None:
@@ -189,8 +191,9 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, pairs in PAIRS.items():
         paths = StudyPaths(folder / name)
         paths.root.mkdir()
-        text = PROTOCOL.replace("[schedule]", MORE.get(name, PLAN))
-        paths.protocol.write_text(text, encoding="utf-8")
+        paths.protocol.write_text(
+            PROTOCOL.replace("[schedule]", MORE.get(name, PLAN)), encoding="utf-8"
+        )
         protocol = read_protocol(paths.protocol)
         conduct.allot_schedules(paths, protocol)
         for pair in pairs:
@@ -204,9 +207,8 @@ def test_words_follow_the_record(what: str, studies: Path, tmp_path: Path) -> No
     case = CASES[what]
     paths = StudyPaths(shutil.copytree(studies / case.of, tmp_path / "study"))
     for rater, session in PAIRS[case.of][case.n_run :]:
-        log = paths.log_file(rater, session)
-        log.unlink()
-        shutil.rmtree(log.with_suffix(""))
+        paths.log_file(rater, session).unlink()
+        shutil.rmtree(paths.log_file(rater, session).with_suffix(""))
     came = case.then((paths, read_protocol(paths.protocol)))
     file = came if isinstance(came, Path) else None
     protocol = read_protocol(paths.protocol)
@@ -214,7 +216,5 @@ def test_words_follow_the_record(what: str, studies: Path, tmp_path: Path) -> No
     happened = report.study_conduct(paths, protocol, file=file, include=case.include)
     of_study = (protocol, data.ratings, analysis.analyze(protocol, data.ratings))
     text = shown(_material.gather(*of_study, conduct=happened))
-    for said in case.says:
-        assert said in text
-    for unsaid in case.never:
-        assert unsaid not in text
+    assert [said for said in case.says if said not in text] == []
+    assert [said for said in case.never if said in text] == []
