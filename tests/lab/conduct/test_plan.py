@@ -163,3 +163,9 @@ def test_another_protocol_in_the_place_of_the_one_that_was_drawn_is_found(
     study.conduct_file.write_text("\n".join([*lines[:-1], forged, ""]))
     broken = [f.message for f in verify_study(study).findings if f.weight == "broken"]
     assert any("needed the protocol with SHA-256" in message for message in broken)
+    text = json.loads(forged)["fields"]["protocol"]  # and its hash, too
+    before = json.loads(forged)["fields"]["protocol_sha256"]
+    forged = forged.replace(before, hashlib.sha256(text.encode()).hexdigest())
+    study.conduct_file.write_text("\n".join([*lines[:-1], forged, ""]))
+    doubted = {f.path for f in verify_study(study).findings if f.weight == "doubt"}
+    assert doubted == {*study.schedules.glob("*_R?.csv"), study.protocol}
