@@ -40,14 +40,14 @@ R1, R2, R3 = (f"sessions/test_{rater}.jsonl" for rater in ("R1", "R2", "R3"))
 CONDUCT, TABLE, ANALYSIS = "conduct.jsonl", "ratings/ratings.csv", "analysis.json"
 RATERS, SCHEDULE, SEALED = "ratings/raters.csv", "schedules/test_R1.csv", "../sealed"
 MANIFEST, NUMBERS = "report/manifest.json", "report/analysis.json"
-PAGES, RECORDING = "report/report.html", "sessions/test_R1/*.npz"
-PLAN = "protocol.toml"
-FACTS = "sessions/test_R1/*.json"
+RECORDING, FACTS = "sessions/test_R1/*.npz", "sessions/test_R1/*.json"
+PAGES, PLAN = "report/report.html", "protocol.toml"
 
 Forge = Callable[[Path], object]
 """Changes a file."""
 
 FOUND, DOUBT, STALE, NO = "found", "in doubt", "out of date", "not found"
+WEIGHTS = {"broken": FOUND, "stale": STALE, "doubt": DOUBT}
 
 
 def lines(change: Callable[[Events], object]) -> Forge:
@@ -71,14 +71,7 @@ def without(kind: str) -> Forge:
 
 
 def at(kind: str, time: str) -> Forge:
-    return lines(
-        lambda of: [e.update(time_utc=time) for e in of if e["event"] == kind]  # type: ignore[arg-type]
-    )
-
-
-def on_another_day(of: Events) -> None:
-    for each in of:
-        each.update(time_utc="2025" + str(each["time_utc"])[4:])  # type: ignore[arg-type]
+    return lines(lambda of: [e.update(time_utc=time) for e in of if e["event"] == kind])
 
 
 def changing_places(key: str) -> Forge:
@@ -154,29 +147,14 @@ def another_order(schedule: Path) -> None:
     line("session", schedule_sha256=sha256)(root_of(schedule) / R1)
 
 
-def a_link(log: Path) -> None:
-    log.rename(log.parent.parent / "elsewhere.jsonl")
-    log.symlink_to("../elsewhere.jsonl")
-
-
-def taken_away(log: Path) -> None:
-    shutil.rmtree(log.with_suffix(""))
-    gone(log)
-
-
-def another_number(file: Path) -> None:
-    document = json.loads(file.read_text())
-    document["estimates"][0]["estimate"]["value"] = 0.9
-    file.write_text(json.dumps(document))
-
-
-def of_other(key: str) -> Forge:
-    """A number, and the hash of what it is of, wherever that is."""
+def number(**inputs: str) -> Forge:
+    """Another number, and perhaps the hash of something else that it is of."""
 
     def forge(file: Path) -> None:
-        another_number(file)
-        sha256 = json.loads(file.read_text())["inputs"][key]
-        edit(file, sha256, hashlib.sha256(b"").hexdigest())
+        document = json.loads(file.read_text())
+        document["estimates"][0]["estimate"]["value"] = 0.9
+        document["inputs"] |= inputs
+        file.write_text(json.dumps(document))
 
     return forge
 
@@ -233,7 +211,11 @@ FORGERIES: list[tuple[str, str, Forge, str, str]] = [
     (
         "a session on another day, all anew",
         R1,
-        remade(lines(on_another_day)),
+        remade(
+            lines(
+                lambda of: [e.update(time_utc=f"2025{e['time_utc'][4:]}") for e in of]
+            )
+        ),
         NO,
         FOUND,
     ),
@@ -263,11 +245,17 @@ FORGERIES: list[tuple[str, str, Forge, str, str]] = [
     (
         "a session taken away with its recordings, all after it anew",
         R3,
-        remade(taken_away),
+        remade(lambda log: [shutil.rmtree(log.with_suffix("")), gone(log)]),
         NO,
         FOUND,
     ),
-    ("a link in the place of a log", R1, a_link, FOUND, FOUND),
+    (
+        "a link in the place of a log",
+        R1,
+        lambda log: [log.rename(log.parent.parent / "x"), log.symlink_to("../x")],
+        FOUND,
+        FOUND,
+    ),
     ("a bit of a recording", RECORDING, with_a_bit_changed, FOUND, FOUND),
     ("the recording of another presentation", RECORDING, of_another, FOUND, FOUND),
     ("the same, its hashes and the chain anew", RECORDING, another_movement, NO, FOUND),
@@ -396,18 +384,18 @@ FORGERIES: list[tuple[str, str, Forge, str, str]] = [
         STALE,
         STALE,
     ),
-    ("a number of the analysis", ANALYSIS, another_number, FOUND, FOUND),
+    ("a number of the analysis", ANALYSIS, number(), FOUND, FOUND),
     (
         "the same, and the hash of ratings",
         ANALYSIS,
-        of_other("ratings_sha256"),
+        number(ratings_sha256="0" * 64),
         FOUND,
         FOUND,
     ),
     (
         "the same, and the hash of the protocol",
         ANALYSIS,
-        of_other("protocol_sha256"),
+        number(protocol_sha256="0" * 64),
         STALE,
         STALE,
     ),
@@ -422,7 +410,7 @@ FORGERIES: list[tuple[str, str, Forge, str, str]] = [
     (
         "a number of the report, with its hash",
         NUMBERS,
-        with_its_hash(another_number),
+        with_its_hash(number()),
         FOUND,
         FOUND,
     ),
@@ -471,8 +459,7 @@ FORGERIES: list[tuple[str, str, Forge, str, str]] = [
 ]
 
 
-SIMULATED = "--session test --grades simulated --quiet"
-BY = "--who MK --why 'a slip'"
+SIMULATED, BY = "--session test --grades simulated --quiet", "--who MK --why 'a slip'"
 
 
 def with_a_corrected_grade(study: Path) -> None:
@@ -523,13 +510,14 @@ Findings = set[tuple[str, str]]
 def found(root: Path) -> tuple[Findings, Findings]:
     """What verify finds in a study, and what it finds with its anchors besides."""
     study, anchors = StudyPaths(root), root.with_suffix(".txt")
-    alone = verify_study(study).findings
-    anchored = anchor_findings(study, read_anchors(anchors))
-    one, other = (
+    alone, anchored = (
         {(f.weight, f.message.replace(str(root), "")) for f in each}
-        for each in (alone, anchored)
+        for each in (
+            verify_study(study).findings,
+            anchor_findings(study, read_anchors(anchors)),
+        )
     )
-    return one, other
+    return alone, anchored
 
 
 @pytest.fixture(scope="module")
@@ -553,18 +541,16 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def outcome(findings: Findings, known: Findings) -> str:
     weights = {weight for weight, _ in findings - known}
-    names = {"broken": FOUND, "stale": STALE, "doubt": DOUBT}
-    return next((names[each] for each in names if each in weights), NO)
-
-
-MANY_STEPS = ("all anew", "after it anew")
+    return next((WEIGHTS[each] for each in WEIGHTS if each in weights), NO)
 
 
 @pytest.mark.parametrize(
     ("what", "file", "forge", "alone", "anchored"),
     [
         pytest.param(
-            *row, marks=[pytest.mark.slow] * row[0].endswith(MANY_STEPS), id=row[0]
+            *row,
+            marks=[pytest.mark.slow] * row[0].endswith(("all anew", "after it anew")),
+            id=row[0],
         )
         for row in FORGERIES
     ],
