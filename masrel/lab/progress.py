@@ -4,7 +4,6 @@ In: a protocol, its schedules and logs. Out: where each session stands, what bec
 each rater, and one next step.
 """
 
-import json
 import shlex
 from collections import Counter
 from collections.abc import Callable, Container, Mapping, Sequence
@@ -24,7 +23,7 @@ from masrel.lab.conduct import (
     rater_values,
     read_conduct,
 )
-from masrel.lab.conduct._study_log import events_of_logs
+from masrel.lab.conduct._plan_versions import plan_versions
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
 from masrel.lab.run._days import Due, due_of, held_on
@@ -303,28 +302,24 @@ def _late_raters(study: StudyPaths, protocol: Protocol) -> set[str]:
     # what is damaged masrel check says
     for _, drawn in _read_drawn(study, protocol.rater_sessions, skips_damaged=True):
         drawn_from.setdefault(drawn.rater, drawn.protocol_sha256)
-    logged = [e.fields for _, e in events_of_logs(study) if e.kind == "drawn"]
+    logged = [each for each in plan_versions(study) if each[1].kind == "drawn"]
     in_force = _protocols_in_force(study, protocol)
     late = set()
     for site in {rater.site for rater in protocol.raters}:
         of_site = {rater.id for rater in protocol.raters if rater.site == site}
         draws = {rater: drawn_from[rater] for rater in drawn_from if rater in of_site}
-        if set(draws.values()) <= {event["protocol_sha256"] for event in logged}:
+        if set(draws.values()) <= {e.fields["protocol_sha256"] for _, e in logged}:
             # whose schedules were drawn anew since has joined no later
-            of_draws = (_raters_of(event, site) for event in logged)
+            of_draws = (
+                {rater.id for rater in then.raters if rater.site == site}
+                for then, event in logged
+                if event.fields["site"] in (None, site)
+            )
             late |= draws.keys() - next(filter(None, of_draws), set())
         else:  # drawn before the log of the study had its draws
             first = _first_draw(draws, [pair for pair in in_force if pair[0] in draws])
             late |= {rater for rater, sha256 in draws.items() if sha256 != first}
     return late
-
-
-def _raters_of(drawn: Mapping[str, object], site: str | None) -> set[str]:
-    # the raters of a site in the protocol that a draw kept, if it was of the site
-    if drawn["site"] not in (None, site):
-        return set()
-    raters = json.loads(str(drawn["protocol"]))["raters"]
-    return {rater["id"] for rater in raters if rater.get("site") == site}
 
 
 def _protocols_in_force(study: StudyPaths, protocol: Protocol) -> list[tuple[str, str]]:

@@ -227,8 +227,8 @@ def _table_differences(
         return False, []
     if is_of_earlier(study, protocol, is_made):
         return True, ["needed what the logs say, got what they said earlier"]
-    known, is_of_ratings = [*texts(protocol)], path == study.ratings_file
-    return False, [*_line_differences(text, known, _FORMAT if is_of_ratings else 1)]
+    newest = _FORMAT if path == study.ratings_file else 1
+    return False, [*_line_differences(text, [*texts(protocol)], newest)]
 
 
 def _line_differences(text: str, known: list[str], newest: int) -> Iterator[str]:

@@ -6,6 +6,7 @@ import os
 import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, groupby, pairwise
 from pathlib import Path
@@ -284,15 +285,11 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         schedules of another secret, folders that others may read, and logs of conduct
         that they may.
     """
-    secret = find_secret(study)
     fitting = [p for p in protocol.rater_sessions if _fault(study, p, protocol) is None]
     schedules = [schedule for _, schedule in _read_drawn(study, fitting)]
     from_seed = sum(each.commitment is None for each in schedules)
-    of_others = sum(
-        each.commitment is not None
-        and (secret is None or not secret.draws(each.site, each.commitment))
-        for each in schedules
-    )
+    secret = find_secret(study)
+    of_others = sum(_is_of_another(secret, each) for each in schedules)
     notes = (
         (
             study.published_secret_file.is_file(),
@@ -312,6 +309,23 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         ),
     )
     return (*(note for is_so, note in notes if is_so), *_open_to_others(study))
+
+
+def _of_another_secret(
+    protocol: Protocol, study: StudyPaths
+) -> Iterator[tuple[Path, str]]:
+    """Yield schedules that were not drawn from the secret that the study has."""
+    with suppress(ScheduleError):  # which `schedule_problems` has
+        secret = find_secret(study)
+        for path, each in _read_drawn(study, protocol.rater_sessions):
+            if secret is not None and _is_of_another(secret, each):
+                yield path, "was drawn from another secret than the study has now"
+
+
+def _is_of_another(secret: StudySecret | None, schedule: Schedule) -> bool:
+    return schedule.commitment is not None and (
+        secret is None or not secret.draws(schedule.site, schedule.commitment)
+    )
 
 
 def _open_to_others(study: StudyPaths) -> Iterator[str]:

@@ -257,8 +257,8 @@ def _logs(study: StudyPaths) -> list[Path]:
         *sorted(study.training.glob("*.jsonl")),
         *sorted(study.rehearsals.glob("*/*.jsonl")),
     ]
-    logs = [log for log in beside if log.is_file()]
-    return [*study.conduct_logs(), *study.logs(), *logs]
+    logs = (*study.conduct_logs(), *study.logs(), *beside)
+    return [log for log in logs if log.is_file() and not log.is_symlink()]
 
 
 def read_anchors(path: Path) -> tuple[Anchor, ...]:

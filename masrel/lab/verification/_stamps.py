@@ -45,8 +45,12 @@ def request_stamp(file: Path, service: str) -> datetime:
     """
     client = _client()
     data = read_regular(file, most=MAX_TABLE)
-    builder = client.TimestampRequestBuilder().data(data)
-    query = builder.hash_algorithm(client.HashAlgorithm.SHA256).build()
+    query = (
+        client.TimestampRequestBuilder()
+        .data(data)
+        .hash_algorithm(client.HashAlgorithm.SHA256)
+        .build()
+    )
     if not service.startswith(("http://", "https://")):
         raise ParameterError(f"stamp: needed an address with http, got {service!r}")
     try:
@@ -120,13 +124,12 @@ def _client() -> ModuleType:
 def _time_of(token: bytes, data: bytes, where: str) -> datetime:
     try:
         answer = _client().decode_timestamp_response(token)
-        info = answer.tst_info
-        imprint = info.message_imprint.message
+        imprint = answer.tst_info.message_imprint.message
     except (ValueError, AttributeError) as error:
         raise ParameterError(f"{where}: needed a time stamp, got: {error}") from error
     if imprint != hashlib.sha256(data).digest():
         raise ParameterError(
             f"{where}: needed a time stamp of these bytes, got another"
         )
-    time: datetime = info.gen_time
+    time: datetime = answer.tst_info.gen_time
     return time

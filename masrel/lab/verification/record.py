@@ -5,12 +5,17 @@ import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, starmap
 from pathlib import Path
 from typing import Any
 
 import masrel
-from masrel.errors import MasrelError, MasrelWarning, ProtocolError, SessionLogError
+from masrel.errors import (
+    MasrelError,
+    MasrelWarning,
+    ProtocolError,
+    SessionLogError,
+)
 from masrel.lab._event_log import read_log
 from masrel.lab._study_files import (
     CUT_OFF,
@@ -24,15 +29,18 @@ from masrel.lab._study_files import (
     read_once,
     read_regular,
 )
-from masrel.lab.conduct import excluded_raters, plan_changes
-from masrel.lab.conduct._plan_versions import is_of_earlier
+from masrel.lab.conduct import excluded_raters, plan_changes, read_conduct
+from masrel.lab.conduct._plan_versions import is_of_earlier, plan_versions
 from masrel.lab.conduct._study_log import (
     allotment_problems,
     conduct_hash,
     merged_log_problems,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol.study import _OPENED
 from masrel.lab.schedule import schedule_problems
+from masrel.lab.schedule.presentation import _read_drawn
+from masrel.lab.schedule.sheets import _of_another_secret
 from masrel.lab.verification._log_findings import (
     Finding,
     broken,
@@ -51,7 +59,10 @@ from masrel.lab.verification._sessions import (
 _REPORT_FORMAT = "masrel report 2"  # what the manifest of a report says its format is
 _HASHED_NAMES = "masrel report 1"  # whose tables and figures have hashes in their names
 
-_OTHER = "was made of another protocol, other ratings or another log"
+_EARLIER, _OTHER = (
+    "is of an earlier state of the record",
+    "was made of another protocol, other ratings or another log",
+)
 
 _SHOWN = 20  # differences of the table that are listed
 
@@ -122,6 +133,7 @@ def verify_study(study: StudyPaths) -> Verification:
         record = verify_sessions(study, protocol)
         findings = (
             *_of_problems(study.schedules, schedule_problems(protocol, study)),
+            *starmap(doubt, _of_another_secret(protocol, study)),
             *record.findings,
             *_output_findings(study, protocol),
         )
@@ -177,7 +189,22 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
 
 def _conduct_findings(study: StudyPaths, protocol: Protocol) -> tuple[Finding, ...]:
     try:
+        hashes = {e.fields["protocol_sha256"] for _, e in plan_versions(study)}
+        unblinded = [e.fields for e in read_conduct(study) if e.kind == "unblinded"]
         return (
+            *(
+                broken(path, "is open, and no log has who unblinded the study, and why")
+                for path in sorted((study.schedules / _OPENED).glob("*.csv"))
+                if all(fields["code"] for fields in unblinded)
+            ),
+            *(
+                doubt(path, "was drawn from a protocol that no log of the study keeps")
+                for path, each in _read_drawn(
+                    study, protocol.rater_sessions, skips_damaged=True
+                )
+                if hashes and each.protocol_sha256 not in hashes
+                if not each.masrel_version.startswith("0.1.")  # which kept none
+            ),
             *(broken(*problem) for problem in merged_log_problems(study)),
             *(broken(*problem) for problem in allotment_problems(study, protocol)),
             *(
@@ -242,12 +269,18 @@ def _of_logs(
 
 def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     # of everything that was made from the logs
+<<<<<<< HEAD
     if is_cut_off(study.report):
         yield stale(study.report, CUT_OFF)
     table, manifest = study.ratings_file, study.report / MANIFEST
     tables = (table, study.answers_file, study.raters_file)
     outputs = (*tables, study.analysis_file, manifest)
     files = [file for file in outputs if file.is_file()]
+=======
+    table, manifest = study.ratings_file, study.report / _MANIFEST
+    outputs = (table, study.answers_file, study.raters_file, study.analysis_file)
+    files = [file for file in (*outputs, manifest) if file.is_file()]
+>>>>>>> plan37
     if not files:
         return  # nothing is loaded for it
     computed: dict[str, dict[str, str]] = {}
@@ -311,19 +344,20 @@ def _numbers_findings(
     place, verb = (
         (path, "analyze") if report is None else (path.with_name(MANIFEST), "report")
     )
-    # an earlier version may have written ratings in another format
-    former = None if numbers else made_of.get("ratings_sha256")
     seen: dict[str, object] = {}  # protocols that were tried, with what else was there
 
     def difference(then: Protocol) -> str | None:
+        # an earlier version may have written ratings in another format
+        former = None if numbers else made_of.get("ratings_sha256")
         material, inputs = _material(study, then, former)
         seen[inputs["protocol_sha256"]] = inputs.get("in_person_sha256")
-        conduct = None if report is None else conduct_hash(study)
-        beside = {} if conduct is None else {"conduct_sha256": conduct}
-        if inputs | beside != made_of:
+        beside = {"conduct_sha256": report and conduct_hash(study)}
+        if inputs | {k: v for k, v in beside.items() if v} != made_of:
             return _OTHER
         return (
-            _unlike(numbers, _leaves(material, inputs, computed)) if numbers else None
+            _unlike(numbers, _leaves(study, material, inputs, computed))
+            if numbers
+            else None
         )
 
     now, of = difference(protocol), str(made_of.get("protocol_sha256"))
@@ -331,13 +365,15 @@ def _numbers_findings(
         return
     # of what is made of the record as it is now, all else is another's
     answers = {None: True, _OTHER: False if now == _OTHER else None}
-    if is_of_earlier(study, protocol, lambda p: answers.get(difference(p), False)):
-        weigh, now = stale, "is of an earlier state of the record"
-    elif study.logs() and seen.get(of, _OTHER) == made_of.get("in_person_sha256"):
-        weigh = broken
-    else:
-        weigh, now = stale, f"{now}, which no log has: it may have been made up"
-    yield weigh(place, f"{now}; masrel {verb} makes it anew")
+    is_earlier = is_of_earlier(
+        study, protocol, lambda then: answers.get(difference(then), False)
+    )
+    is_known = study.logs() and seen.get(of, _OTHER) == made_of.get("in_person_sha256")
+    unknown = "" if is_known else ", which no log has: it may have been made up"
+    yield (broken if is_known and not is_earlier else stale)(
+        place,
+        f"{_EARLIER if is_earlier else now + unknown}; masrel {verb} makes it anew",
+    )
 
 
 def _unlike(numbers: Mapping[str, object], needed: Mapping[str, str]) -> str | None:
@@ -384,12 +420,11 @@ def _material(
         "ratings": ratings,
         "in_person": in_person,
         "answers": answers,
-        "excluded": excluded_raters(study),
-        "changes": plan_changes(study, protocol),
     }, inputs
 
 
 def _leaves(
+    study: StudyPaths,
     material: dict[str, Any],
     inputs: Mapping[str, str],
     computed: dict[str, dict[str, str]],
@@ -397,12 +432,15 @@ def _leaves(
     """Return every place of the analysis of a study, computed once of what it is of."""
     from masrel.lab.analysis import analyze, as_analysis_document
 
-    of = repr((inputs, material["excluded"], material["changes"]))
+    beside: dict[str, Any] = {
+        "excluded": excluded_raters(study),
+        "changes": plan_changes(study, material["protocol"]),
+    }
+    of = repr((inputs, beside))
     if of not in computed:
         with warnings.catch_warnings(action="ignore", category=MasrelWarning):
-            analysis = analyze(**material)
-        document = as_analysis_document(replace(analysis, inputs=inputs))
-        computed[of] = dict(leaves(document, within=(dict, list)))
+            analysis = replace(analyze(**material, **beside), inputs=inputs)
+        computed[of] = dict(leaves(as_analysis_document(analysis), within=(dict, list)))
     return computed[of]
 
 
@@ -418,6 +456,7 @@ def _report_findings(
     if not isinstance(files, dict) or not isinstance(inputs, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
         return
+<<<<<<< HEAD
     if (of_format := document.get("format")) == _HASHED_NAMES:
         yield stale(
             manifest,
@@ -427,11 +466,19 @@ def _report_findings(
     elif of_format != _REPORT_FORMAT:
         needed = f"needed format {_REPORT_FORMAT!r}, got {of_format!r}"
         yield broken(manifest, needed)
+=======
+    if document.get("format") != _REPORT_FORMAT:
+        yield broken(
+            manifest,
+            f"needed format {_REPORT_FORMAT!r}, got {document.get('format')!r}",
+        )
+>>>>>>> plan37
         return
     beside = ("include", "claims_sha256")  # what is shown of the same, and of others
     of = {key: value for key, value in inputs.items() if key not in beside}
-    numbers = manifest.with_name("analysis.json")
-    yield from _numbers_findings(study, protocol, numbers, computed, of)
+    yield from _numbers_findings(
+        study, protocol, manifest.with_name("analysis.json"), computed, of
+    )
     claims, of_claims = study.claims_file, inputs.get("claims_sha256")
     if of_claims and of_claims != (_sha256(claims) if claims.is_file() else None):
         yield broken(manifest, f"the report is of other claims than {claims.name}")

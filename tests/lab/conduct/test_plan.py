@@ -9,6 +9,7 @@ import pytest
 
 from masrel.errors import ParameterError
 from masrel.lab.conduct import allot_schedules, plan_changes, record_amendment
+from masrel.lab.conduct._plan_versions import plan_versions
 from masrel.lab.progress import rater_progress, session_progress
 from masrel.lab.protocol import (
     StudyPaths,
@@ -19,6 +20,7 @@ from masrel.lab.protocol import (
 from masrel.lab.ratings import study_remarks
 from masrel.lab.verification import verify_study
 from tests.files import edit
+from tests.lab.flow.conftest import run
 
 KAPPA = "analysis.estimates.kappa.coefficient"
 
@@ -106,6 +108,28 @@ def test_what_changes_after_the_draw_is_named_until_and_after_it_is_recorded(
     assert sum(each[0] in doubt for doubt in doubts for each in named) == len(named)
 
 
+def test_changes_are_in_the_analysis_the_checklist_and_the_export(
+    study: StudyPaths, tmp_path: Path
+) -> None:
+    root, out = str(study.root), tmp_path / "out"
+    run("run", root, *("--rater", "R1", "--session", "test", "--grades", "simulated"))
+    edit(study.protocol, '"fleiss_kappa"', '"gwet_ac"')
+    run("record", "amend", root, "--who", "MK", "--why", "a private reason")
+    (change,) = plan_changes(study, read_protocol(study.protocol))
+    run("analyze", root)
+    kept = json.loads(study.analysis_file.read_bytes())["plan_changes"]
+    at = {"before": '"fleiss_kappa"', "after": '"gwet_ac"', "time_utc": change.time_utc}
+    assert kept == [{"key": KAPPA, **at}]
+    run("checklist", root, "--guideline", "grras", "-o", f"{out}.md")
+    run("export", root, "--as", "bids", "-o", str(out), "--quiet")
+    drawn = next(e for _, e in plan_versions(study))
+    for text in (Path(f"{out}.md").read_text(), (out / "README.md").read_text()):
+        assert text.replace("\\", "").count(f"{change}.") >= 1
+    page = Path(f"{out}.md").read_text()
+    assert f"since its first draw on {drawn.time_utc[:10]}" in page
+    assert str(drawn.fields["protocol_sha256"]) in page
+
+
 def test_an_amendment_needs_a_draw_and_a_change(tmp_path: Path) -> None:
     copy_template("small", tmp_path)
     study = StudyPaths(tmp_path)
@@ -139,3 +163,9 @@ def test_another_protocol_in_the_place_of_the_one_that_was_drawn_is_found(
     study.conduct_file.write_text("\n".join([*lines[:-1], forged, ""]))
     broken = [f.message for f in verify_study(study).findings if f.weight == "broken"]
     assert any("needed the protocol with SHA-256" in message for message in broken)
+    text = json.loads(forged)["fields"]["protocol"]  # and its hash, too
+    before = json.loads(forged)["fields"]["protocol_sha256"]
+    forged = forged.replace(before, hashlib.sha256(text.encode()).hexdigest())
+    study.conduct_file.write_text("\n".join([*lines[:-1], forged, ""]))
+    doubted = {f.path for f in verify_study(study).findings if f.weight == "doubt"}
+    assert doubted == {*study.schedules.glob("*_R?.csv"), study.protocol}

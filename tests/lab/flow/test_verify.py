@@ -3,6 +3,7 @@ those that compute it anew."""
 
 import hashlib
 import json
+import shlex
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.lab.conduct import Note, record_note, record_standing
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.run import record_correction
 from masrel.lab.verification import (
@@ -136,25 +136,8 @@ def with_models_that_change_places(schedule: Path) -> Path:
     return schedule.parent.parent
 
 
-def withdrawn(study: StudyPaths) -> None:
-    protocol = read_protocol(study.protocol)
-    record_standing(study, protocol, "R2", "withdrawn", who="Kim", why="left")
-
-
-def noted(study: StudyPaths) -> None:
-    note = Note(text="a power cut", who="Kim")
-    record_note(study, read_protocol(study.protocol), note)
-
-
-def planned_otherwise(study: StudyPaths) -> None:
-    edit(study.protocol, '"percent_agreement"', '"gwet_ac"')
-
-
-def rated_by_one_more(study: StudyPaths) -> None:
-    root, of_rater = str(study.root), ("--rater", "R3", "--session", "test")
-    run("record", "rater", "add", root, *of_rater, "--who", "Kim")
-    run("schedule", root)
-    run("run", root, *of_rater, "--grades", "simulated", "--quiet")
+def called(*commands: str) -> Callable[[StudyPaths], object]:
+    return lambda of: [run(*shlex.split(each.format(of.root))) for each in commands]
 
 
 def corrected(study: StudyPaths) -> None:
@@ -270,15 +253,28 @@ ANALYSIS, REPORT = "analysis.json", "report/manifest.json"
 @pytest.mark.parametrize(
     ("later", "made_before"),
     [
-        (noted, [REPORT]),
-        (withdrawn, [RATERS, REPORT]),
+        (called("record note {0} cut --who Kim"), [REPORT]),
+        (
+            called("record withdraw {0} --rater R2 --who Kim --why left"),
+            [RATERS, REPORT],
+        ),
         (corrected, [TABLE, ANALYSIS, REPORT]),
-        (planned_otherwise, [ANALYSIS, REPORT]),
-        (rated_by_one_more, [TABLE, RATERS, ANALYSIS, REPORT]),
+        (
+            lambda of: edit(of.protocol, '"percent_agreement"', '"gwet_ac"'),
+            [ANALYSIS, REPORT],
+        ),
+        (
+            called(
+                "record rater add {0} --rater R3 --session test --who Kim",
+                "schedule {0}",
+                "run {0} --rater R3 --session test --grades simulated --quiet",
+            ),
+            [TABLE, RATERS, ANALYSIS, REPORT],
+        ),
     ],
 )
 def test_what_is_out_of_date_is_stale_and_is_made_anew(
-    study: StudyPaths, later: Callable[[StudyPaths], None], made_before: list[str]
+    study: StudyPaths, later: Callable[[StudyPaths], object], made_before: list[str]
 ) -> None:
     later(study)
     findings = [f for f in verify_study(study).findings if f.weight != "doubt"]
