@@ -19,6 +19,7 @@ from masrel.estimates import (
     as_document,
 )
 from masrel.tables._estimate_words import (
+    Noun,
     forest_row,
     origin,
     pair_words,
@@ -184,7 +185,7 @@ def answer_table(
     shown = answer.rows if answer.shown is None else answer.shown
     notes, after = list(answer.notes), []
     if estimates:
-        shown = [_cells(row, answer.heads, bands, detail) for row in estimates]
+        shown = [_cells(row, answer.heads, bands, detail, items) for row in estimates]
         notes += _errors_note(estimates, in_sentences)
         notes += [] if in_sentences else _paired_note(estimates, items)
         after = [] if bands is None else [words_note(estimates, bands)]
@@ -313,6 +314,7 @@ def _cells(
     heads: Mapping[str, str],
     bands: BandScale | None,
     detail: Detail,
+    items: str,
 ) -> Row:
     # what columns show, and the texts of notes: how the interval was made, what to know
     # of it, and why a value is undefined
@@ -332,7 +334,8 @@ def _cells(
         "interval_texts": None,
     }
     if interval is not None:
-        texts = [] if interval.reason else [_interval_note(interval, detail)]
+        noun: Noun = "model" if items == "models" else "item"
+        texts = [] if interval.reason else [_interval_note(interval, detail, noun)]
         if interval.reason not in (None, estimate.reason):
             why = f"no interval ({interval.method}): {interval.reason}"
             texts.append(_Caution(why))
@@ -404,13 +407,14 @@ def _paired_note(rows: Sequence[AgreementRow], items: str) -> list[str]:
     return [f"{capital(items)} that have {pair}: {', '.join(counts)}."]
 
 
-def _interval_note(interval: Interval, detail: Detail) -> str:
+def _interval_note(interval: Interval, detail: Detail, noun: Noun) -> str:
     ends = "bound" if interval.is_one_sided else "interval"
     kind = f"credible {ends}" if interval.kind == "credible" else "CI"
     name = f"{percent(interval.level)} % {kind}, {interval.method}"
-    to = f": generalises to {_population(interval)} like these"
+    population = _population(interval).replace("item", noun)
+    to = f": generalises to {population} like these"
     if detail == "all":
-        return f"{name}{origin(interval, 'item')}{to}: {promise(interval, 'item')}"
+        return f"{name}{origin(interval, noun)}{to}: {promise(interval, noun)}"
     return name + to
 
 

@@ -73,10 +73,12 @@ def analyze(
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
     from masrel.lab.report import study_conduct
+    from masrel.lab.report._agreement import estimate_tables
     from masrel.lab.report._document import made_section
     from masrel.lab.report._grade_sections import felt_sentences
-    from masrel.lab.report._material import gather
-    from masrel.pages._sections import Paragraph
+    from masrel.lab.report._material import gather, lacking
+    from masrel.lab.report._trace_section import speed_tables
+    from masrel.pages._sections import Content, Paragraph
     from masrel.tables._tables import Table, as_csv, as_text
 
     conduct = study_conduct(data.paths, data.protocol)
@@ -85,26 +87,14 @@ def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> N
     felt = felt_sentences(material)
     if felt:
         click.echo(textwrap.fill(felt, 88) + "\n", err=csv)
-    for name in _computed(analysis):
+    contents: list[Content] = [table for _, table in estimate_tables(material)]
+    for name in ("intended", "in-person", "questionnaires"):
         _, section, reason = made_section(name, material)
-        if reason:
+        if reason not in ("", lacking(None).text):
             click.echo(f"{name} is not in these data: {reason}\n", err=csv)
-        for block in section.blocks:
-            if isinstance(block, Table):
-                click.echo(as_csv(block, raw=raw) if csv else as_text(block) + "\n")
-            elif isinstance(block, Paragraph) and not csv:
-                click.echo(textwrap.fill(block.text, 88) + "\n")
-
-
-def _computed(analysis: "Analysis") -> list[str]:
-    # Sections of the report that show what an analysis holds; a trace is not one.
-    kinds = {planned.line.kind for planned in analysis.estimates}
-    is_computed = {
-        "agreement": "inter-rater" in kinds,
-        "test-retest": "test-retest" in kinds,
-        "intended": analysis.intended is not None,
-        "in-person": analysis.in_person is not None,
-        "speeds": analysis.speeds is not None,
-        "questionnaires": bool(analysis.questionnaires),
-    }
-    return [name for name, computed in is_computed.items() if computed]
+        contents += section.blocks
+    for block in (*contents, *speed_tables(material)):
+        if isinstance(block, Table) and block.rows:
+            click.echo(as_csv(block, raw=raw) if csv else as_text(block) + "\n")
+        elif isinstance(block, Paragraph) and not csv:
+            click.echo(textwrap.fill(block.text, 88) + "\n")

@@ -3,21 +3,27 @@
 The first table of coefficients is short, and has every field in the CSV.
 """
 
-import dataclasses
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
 from masrel.agreement import COEFFICIENTS, BandScale, category_kappa, code_ratings
-from masrel.analysis._file_estimates import AgreementRow, lower_bound
+from masrel.analysis._file_estimates import (
+    AgreementRow,
+    Answer,
+    Explanation,
+    lower_bound,
+)
 from masrel.errors import MasrelWarning
 from masrel.estimates import Estimate, Interval
 from masrel.intervals.diagnosis import _category_arrays
+from masrel.lab._study_files import once
 from masrel.lab.analysis import PlannedEstimate
 from masrel.lab.analysis._plan import with_level
 from masrel.lab.protocol import EstimatePlan
@@ -29,20 +35,19 @@ from masrel.lab.report._material import (
     SUPPLEMENT,
     TARGETS,
     Material,
-    are_too_few,
     at_ranks,
     coefficient_name,
     estimate_titles,
-    interval_cells,
-    interval_name,
+    few,
     lacking,
+    lines_of,
+    macros,
     main_estimate,
-    meaning,
     too_few,
 )
-from masrel.pages._sections import Content, Drawing, Paragraph
+from masrel.pages._sections import Content, Drawing
 from masrel.plots._drawn_values import FOREST, Drawn, ForestRow
-from masrel.tables._answer_tables import word_of, words_note
+from masrel.tables._answer_tables import answer_table, word_of
 from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import (
     Column,
@@ -71,11 +76,13 @@ _COLUMNS = (
     Column(key="high", heading="High", where="csv"),
     Column(key="n_items", heading="Models"),
     Column(key="n_raters", heading="Raters"),
-    Column(key="interval", heading="Method", align="left"),
-    Column(key="target", heading="Generalises to", align="left"),
+    Column(key="standard_error", heading="SE", where="csv"),
+    Column(key="median", heading="Median", where="csv"),
+    Column(key="interval", heading="Method", where="csv"),
+    Column(key="target", heading="Generalises to", where="csv"),
     Column(key="coefficient", heading="Coefficient", where="csv"),
     Column(key="models", heading="Models", where="csv"),
-    Column(key="sessions", heading="Session", align="left"),
+    Column(key="sessions", heading="Session", where="csv"),
     Column(key="strength", heading="At least", align="left"),
     Column(key="observed", heading="p_o", digits=3),
     Column(key="chance", heading="p_e", digits=3),
@@ -86,34 +93,48 @@ _SHORT = ("title", "value", "interval_shown", "n_items", "n_raters")
 
 def estimates_section(material: Material) -> Iterator[Content]:
     """Show the plan's estimates with their intervals, or why one is not there."""
-    rows = [
-        row for row in _rows(material, material.analysis.estimates) if not row.rater
-    ]
-    if not rows:
-        return
-    table = _estimate_table(material, rows, rows, "agreement", "Estimates of agreement")
-    short = tuple(
-        column if column.key in _SHORT else dataclasses.replace(column, where="csv")
-        for column in _COLUMNS
-    )
-    notes = tuple(_short_notes(rows, material.analysis.level))
-    yield dataclasses.replace(table, columns=short, notes=notes)
-    yield _forest(material, rows, "agreement", "Agreement")
-    yield SUPPLEMENT
-    yield dataclasses.replace(table, caption=f"{table.caption}, and how each was made")
-    yield from _meanings(rows)
+    (rows, table), _ = estimate_tables(material)
+    if rows:
+        short = tuple(
+            column if column.key in _SHORT else replace(column, where="csv")
+            for column in _COLUMNS
+        )
+        notes = tuple(lines_of(_say().short(rows, material.analysis.level)))
+        caption = "Estimates of agreement"
+        yield replace(table, caption=caption, columns=short, notes=notes)
+        yield _forest(material, rows, "agreement", "Agreement")
+        yield SUPPLEMENT
+        yield table
 
 
 def retest_section(material: Material) -> Iterator[Content]:
     """Show the agreement of raters with themselves: of all, and of each alone."""
-    planned = [p for p in material.analysis.estimates if p.line.kind == "test-retest"]
-    if every := [row for row in _rows(material, planned) if row.estimate is not None]:
-        name, caption = "test_retest", "Agreement of raters with themselves"
-        rows = _few_of_many(every)
-        yield _forest(material, rows, name, caption)
+    _, (rows, table) = estimate_tables(material)
+    if rows:
+        yield _forest(material, rows, table.name, table.caption)
         yield SUPPLEMENT
-        yield _estimate_table(material, every, rows, name, caption)
-        yield from _meanings(rows)
+        yield table
+
+
+@once
+def estimate_tables(material: Material) -> Sequence[tuple[Sequence["_Row"], Table]]:
+    """Return the tables of the plan's estimates and of raters with themselves."""
+    # each with the rows that a page has of it
+    every = [*_rows(material)]
+    lines = [row for row in every if not row.rater]
+    again = [row for row in every if row.estimate and row.line.kind == "test-retest"]
+    captions = {
+        "agreement": "Estimates of agreement, and how each was made",
+        "test_retest": "Agreement of raters with themselves",
+    }
+    return [
+        _with_table(material, of, name, caption)
+        for of, (name, caption) in zip((lines, again), captions.items(), strict=True)
+    ]
+
+
+def _say() -> Any:
+    return macros("estimates.txt", {"targets": TARGETS})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,38 +143,33 @@ class _Row:
 
     line: EstimatePlan
     title: str  # of the line
+    label: str  # what it is called in a table: the title, and the rater
     rater: str  # whose agreement with him- or herself it is; "" of all
     coefficient: str
     estimate: Estimate | None
+    interval: Interval | None  # of the estimate
     instead: str  # what is shown where there is none
     reason: str | None  # why there is none
     earned: AgreementRow | None  # what the best word that it reaches is known from
 
-    @property
-    def label(self) -> str:
-        """What it is called in a table."""
-        return f"{self.title}: {self.rater}" if self.rater else self.title
 
-    @property
-    def interval(self) -> Interval | None:
-        """The interval of the estimate."""
-        return None if self.estimate is None else self.estimate.interval
-
-
-def _rows(material: Material, planned: Sequence[PlannedEstimate]) -> Iterator[_Row]:
+def _rows(material: Material) -> Iterator[_Row]:
     # each line of the plan, followed by those of its raters
     titles = estimate_titles([p.line for p in material.analysis.estimates])
-    for entry in planned:
+    for entry in material.analysis.estimates:
         for nth, (rater, coefficient, estimate) in enumerate(_estimates(entry)):
+            label = ": ".join(filter(None, (titles[entry.line.id], rater)))
             yield _Row(
                 line=entry.line,
                 title=titles[entry.line.id],
+                label=label,
                 rater=rater,
                 coefficient=coefficient_name(coefficient, entry.line.weights),
                 estimate=estimate,
+                interval=None if estimate is None else estimate.interval,
                 instead="of each rater" if entry.by_rater else NOT_THERE,
                 reason=entry.reason,
-                earned=_earned(material, entry, nth, estimate),
+                earned=_earned(material, entry, nth, estimate, label),
             )
 
 
@@ -166,7 +182,11 @@ def _estimates(entry: PlannedEstimate) -> list[tuple[str, str, Estimate | None]]
 
 
 def _earned(
-    material: Material, entry: PlannedEstimate, nth: int, estimate: Estimate | None
+    material: Material,
+    entry: PlannedEstimate,
+    nth: int,
+    estimate: Estimate | None,
+    title: str,
 ) -> AgreementRow | None:
     if estimate is None:
         return None
@@ -177,9 +197,19 @@ def _earned(
         return _estimates(again)[nth][2] or estimate
 
     is_raw = not COEFFICIENTS[estimate.coefficient].chance_corrected
-    bound = None if is_raw else lower_bound(estimate, at_level)
-    title = coefficient_name(estimate.coefficient)
-    return AgreementRow(keys={}, title=title, estimate=estimate, lower_bound=bound)
+    median, n_undefined = (
+        getattr(estimate.interval, name, None) for name in ("median", "n_undefined")
+    )
+    return AgreementRow(
+        keys={},
+        title=title,
+        estimate=estimate,
+        notes=(
+            *([] if median is None else [f"posterior median {number(median, 3)}"]),
+            *[f"undefined on {n_undefined} resamples"] * bool(n_undefined),
+        ),
+        lower_bound=None if is_raw else lower_bound(estimate, at_level),
+    )
 
 
 def _few_of_many(rows: Sequence[_Row]) -> list[_Row]:
@@ -190,66 +220,41 @@ def _few_of_many(rows: Sequence[_Row]) -> list[_Row]:
         if len(alike) > MANY_RATERS:
             values = [row.estimate.value if row.estimate else math.nan for row in alike]
             alike = [
-                dataclasses.replace(alike[at], rater=f"{alike[at].rater} ({rank})")
+                replace(
+                    alike[at],
+                    rater=f"{alike[at].rater} ({rank})",
+                    label=f"{alike[at].label} ({rank})",
+                )
                 for rank, at in at_ranks(values).items()
             ]
         shown += alike
     return shown
 
 
-def _short_notes(rows: Sequence[_Row], level: float) -> Iterator[str]:
-    # at most three: the supplement says the rest
-    intervals = [row.interval for row in rows if row.interval is not None]
-    kinds = sorted({f"{of.kind} for {TARGETS[of.target]}" for of in intervals})
-    if kinds:
-        yield (
-            f"Intervals of {percent(level)} %: {', '.join(kinds)}. How each was made, "
-            "and what to know of it, is in the supplement, Estimates in full."
-        )
-    absent = (row.reason for row in rows if row.instead == NOT_THERE)
-    undefined = (row.estimate.reason for row in rows if row.estimate)
-    for what, reasons in (("Not in these data", absent), ("Undefined", undefined)):
-        if texts := [*dict.fromkeys(filter(None, reasons))]:
-            yield f"{what}: {'; '.join(texts)}."
-
-
-def _meanings(rows: Sequence[_Row]) -> Iterator[Paragraph]:
-    intervals = [row.interval for row in rows if row.interval is not None]
-    for text in dict.fromkeys(map(meaning, intervals)):
-        yield Paragraph(text=text)
-
-
-def _estimate_table(
-    material: Material,
-    every: Sequence[_Row],
-    rows: Sequence[_Row],
-    name: str,
-    caption: str,
-) -> Table:
-    # rows: those of a page; the file has every one
-    remarks: dict[str, list[str]] = {}  # a text to the rows it is of
-    for row in rows:
-        # what a reader must know before relying on it
-        texts = [row.reason, None if row.estimate is None else row.estimate.reason]
-        if (interval := row.interval) is not None:
-            if interval.median is not None:
-                texts.append(f"posterior median {number(interval.median, 3)}")
-            texts += [*interval.notes, interval.reason]
-            if interval.n_undefined:
-                texts.append(f"undefined on {interval.n_undefined} resamples")
-        for text in dict.fromkeys(text.rstrip(".") for text in texts if text):
-            remarks.setdefault(text, []).append(row.label)
-    notes = [f"{'; '.join(names)}: {text}." for text, names in remarks.items()]
-    earned = [row.earned for row in rows if row.earned is not None]
-    if earned:
-        notes.append(_AGREEMENTS)
-    if any(word_of(row, _BANDS) for row in earned):
-        notes.append(words_note(earned, _BANDS))
-    if len(rows) < len(every):
-        notes.append("Of many raters, five by their value; the file has all.")
-    table = partial(table_of, name, caption, _COLUMNS, data=material.data)
-    shown = table([*map(_cells, rows)]).rows
-    return table([*map(_cells, every)], page_rows=shown, notes=tuple(notes))
+def _with_table(
+    material: Material, every: Sequence[_Row], name: str, caption: str
+) -> tuple[Sequence[_Row], Table]:
+    # the rows of a page, and the table, whose file has every one
+    rows = _few_of_many(every)
+    earned = tuple(row.earned for row in rows if row.earned is not None)
+    notes = answer_table(
+        Answer(name="agreement", estimates=earned),
+        bands=_BANDS if any(word_of(row, _BANDS) for row in earned) else None,
+        detail="all",
+        items="models",
+        in_sentences=False,
+        data=material.data,
+    ).notes
+    five = "Of many raters, five by their value; the file has all."
+    notes = (
+        *(note for note in notes if not isinstance(note, Explanation)),
+        *[_AGREEMENTS] * bool(earned),
+        *(f"{row.label}: {row.reason}." for row in rows if row.reason),
+        *[five] * (len(rows) < len(every)),
+    )
+    table = partial(table_of, name, caption, _COLUMNS, data=material.data, notes=notes)
+    page = table([*map(_cells, rows)])
+    return rows, table([*map(_cells, every)], page_rows=page.rows)
 
 
 def _cells(row: _Row) -> dict[str, Value]:
@@ -265,16 +270,19 @@ def _cells(row: _Row) -> dict[str, Value]:
     if estimate is None:
         return {**cells, "interval_shown": row.instead}
     if interval is not None:
-        text = interval_text(interval.low, interval.high)
         cells |= {
-            "interval_shown": too_few(estimate) or text,
+            "interval_shown": too_few(estimate)
+            or interval_text(interval.low, interval.high),
             "low": interval.low,
             "high": interval.high,
-            "interval": interval_name(interval),
+            "interval": f"{percent(interval.level)} % {interval.kind}, "
+            f"{interval.method}",
             "target": TARGETS[interval.target],
+            "median": interval.median,
         }
     return cells | {
         "value": estimate.value,
+        "standard_error": estimate.standard_error,
         "n_items": estimate.n_items,
         "n_raters": 1 if row.rater else estimate.n_raters,
         "strength": None if row.earned is None else word_of(row.earned, _BANDS),
@@ -287,53 +295,29 @@ def _cells(row: _Row) -> dict[str, Value]:
 def _forest(
     material: Material, rows: Sequence[_Row], name: str, caption: str
 ) -> Drawing:
-    lines = [_forest_line(row, has_raters=any(of.rater for of in rows)) for row in rows]
-    texts = "; ".join(
-        f"{line.group} {line.label}: {line.text}".strip() for line in lines
-    )
+    say, has_raters = _say(), any(row.rater for row in rows)
+    lines = tuple(_forest_line(row, say, has_raters=has_raters) for row in rows)
+    texts = (f"{line.group} {line.label}: {line.text}".strip() for line in lines)
     return Drawing(
         name=name,
-        caption=" ".join(_looks(lines, caption)),
-        alt=f"Forest plot. {texts}.",
-        content=Drawn(FOREST, (tuple(lines), "agreement (1 is perfect)")),
+        caption=" ".join(lines_of(say.looks(caption, lines))),
+        alt=f"Forest plot. {'; '.join(texts)}.",
+        content=Drawn(FOREST, (lines, "agreement (1 is perfect)")),
         stamp=material.stamp,
     )
 
 
-def _forest_line(row: _Row, *, has_raters: bool) -> ForestRow:
+def _forest_line(row: _Row, say: Any, *, has_raters: bool) -> ForestRow:
     # beside raters a line of the plan is the heading of what is of it
-    estimate, interval = row.estimate, row.interval
     label, group = ("all raters", row.title) if has_raters else (row.title, "")
-    if estimate is None:
+    if (estimate := row.estimate) is None:
         return ForestRow(label=label, text=row.instead, has_zero=False)
-    models, detail = counted(estimate.n_items, "model"), ""
-    if row.rater:
-        label = f"{row.rater}, {row.coefficient}"
-    else:
-        detail = f"{models}, {counted(estimate.n_raters, 'rater')}"
-    if interval is not None and detail:
-        kind = interval.kind + ", one-sided" * interval.is_one_sided
-        detail += f"; {kind}, {TARGETS[interval.target]}"
     if too_few(estimate):
-        estimate = dataclasses.replace(estimate, interval=None)
+        estimate = replace(estimate, interval=None)
+    if row.rater:
+        return forest_row(f"{row.rater}, {row.coefficient}", estimate, group=group)
+    detail = str(say.detail(estimate, row.interval))
     return forest_row(label, estimate, detail=detail, group=group)
-
-
-def _looks(lines: Sequence[ForestRow], caption: str) -> Iterator[str]:
-    # what is drawn of them, and nothing else
-    intervals = [line.interval for line in lines if line.interval is not None]
-    kinds = {interval.kind for interval in intervals}
-    shapes = [of.distribution.continuous for of in intervals if of.distribution]
-    looks = {"confidence": "lines with ends", "credible": "broad bars"}
-    marks = [f"{kind} intervals ({looks[kind]})" for kind in sorted(kinds)]
-    marks.insert(0, "estimates (dots)")
-    yield f"{caption}: {', '.join(marks)}."
-    if True in shapes:
-        yield "Filled curves: posterior densities, each to its own height."
-    if False in shapes:
-        yield "Blue, above: resamples, each row to its own height."
-    if any(line.has_zero for line in lines):
-        yield "Dashed: what chance gives."
 
 
 def categories_section(material: Material) -> Iterator[Content]:
@@ -383,11 +367,12 @@ def _category_rows(
             category_kappa(matrix.grades, grade, categories=grades).value
             for grade in grades
         ]
-    few = are_too_few(counted(len(entry.models), "model"))
+    n_models = counted(len(entry.models), "model")
     keys = ("counts", "values", "low", "high")
     columns = [arrays[f"category_{key}"].tolist() for key in keys]
     for grade, n, value, *ends, kappa in zip(grades, *columns, kappas, strict=True):
         if n:
-            yield grade, n, value, *interval_cells(*ends, few=few), kappa
+            shown = few(ends, n_models) or interval_text(*ends)
+            yield grade, n, value, shown, *ends, kappa
         else:
             yield grade, n, *[None] * 5

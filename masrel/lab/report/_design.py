@@ -9,10 +9,18 @@ from masrel.lab.analysis import PlannedEstimate
 from masrel.lab.protocol import Protocol, SampleSize
 from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
-from masrel.lab.report._material import MANY_RATERS, Material, lacking, sentence
+from masrel.lab.report._material import (
+    MANY_RATERS,
+    Material,
+    lacking,
+    lines_of,
+    macros,
+    sentence,
+    text_of,
+)
 from masrel.lab.report._paragraphs import planned_text
 from masrel.pages._sections import Content, Paragraph
-from masrel.tables._tables import Column, Table, Value, as_entered, counted, number
+from masrel.tables._tables import Column, Table, Value, as_entered
 
 _PARAMETERS = (
     ("catch_angle_constant_deg", "L (deg)"),
@@ -103,18 +111,8 @@ def _models(material: Material) -> Table:
     ]
     shared = material.protocol.elbow.residual_reading
     readings = {model.constants.residual_reading or shared for model in models}
-    meaning_of_q = "share of the peak of the catch, as each model reads it (see below)"
-    if readings == {"residual"}:
-        meaning_of_q = "residual over peak torque of the catch"
-    elif readings == {"decrease"}:
-        meaning_of_q = "decrease after the peak of the catch over the rise to it"
-    notes = [
-        "L: catch angle constant; H: catch torque per stretching speed; Q: "
-        f"{meaning_of_q}; D: angle travelled during the catch."
-    ]
-    simulated = ", ".join(model.id for model in models if model.simulated)
-    if simulated:
-        notes.append(f"Fitted to SIMULATED recordings: {simulated}.")
+    simulated = [model.id for model in models if model.simulated]
+    notes = macros("design.txt", {}).models(sorted(readings), simulated)
     return Table(
         name="models",
         caption="Haptic models and their parameters",
@@ -131,7 +129,7 @@ def _models(material: Material) -> Table:
             (model.id, model.role, model.intended_grade, *values)
             for model, *values in zip(models, *parameters, strict=True)
         ),
-        notes=tuple(notes),
+        notes=tuple(lines_of(notes)),
         data=material.data,
     )
 
@@ -203,6 +201,7 @@ def _other_kinds(material: Material) -> Iterator[Table]:
 
 def _sessions(material: Material) -> Table:
     protocol, ratings = material.protocol, material.ratings.rows
+    graded = [row for row in ratings if row.grade is not None]
     # known of ratings from session logs
     origins = {
         key: heading
@@ -239,7 +238,7 @@ def _sessions(material: Material) -> Table:
         page_rows=tuple(shown),
         notes=(
             *["The file names all raters."] * (shown != rows),
-            *_without_ratings(protocol, [r for r in ratings if r.grade is not None]),
+            *lines_of(macros("design.txt", {}).without(protocol, graded)),
         ),
         data=material.data,
     )
@@ -254,17 +253,6 @@ def _by_rater(ratings: Sequence[Rating], key: str) -> str | None:
     if len(raters) < 2:
         return next(iter(raters), None)
     return "; ".join(f"{value}: {', '.join(who)}" for value, who in raters.items())
-
-
-def _without_ratings(protocol: Protocol, graded: Sequence[Rating]) -> Iterator[str]:
-    sessions = {row.session for row in graded}
-    rated = {row.model for row in graded}
-    absent = [each.id for each in protocol.sessions if each.id not in sessions]
-    if absent:
-        yield f"No ratings in these data: session {', '.join(absent)}."
-    unrated = [each.id for each in protocol.models if each.id not in rated]
-    if unrated and rated:
-        yield f"Models without ratings in these data: {', '.join(unrated)}."
 
 
 _SIZES = (
@@ -292,7 +280,8 @@ def sample_size_section(material: Material) -> Iterator[Content]:
     for size in sizes:
         result = of_line[size.estimate]
         planned = size_sentence(material.protocol, size)
-        yield Paragraph(text=f"{result.line.id}: {planned} {_outcome(result, size)}")
+        came = text_of("design.txt", "outcome", result, size, *_ends(result))
+        yield Paragraph(text=f"{result.line.id}: {planned} {came}")
         rows += _size_rows(result, size)
     yield Table(
         name="sample_size",
@@ -343,31 +332,6 @@ def size_sentence(protocol: Protocol, size: SampleSize) -> str:
 
 def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
-
-
-def _outcome(result: PlannedEstimate, size: SampleSize) -> str:
-    if result.reason is not None:
-        return sentence("sample-size", "absent", reason=result.reason)
-    words = {
-        "items": counted(len(result.items), "item"),
-        "raters": counted(len(result.raters), "rater"),
-        "missing": f" ({result.n_missing} ratings missing)" * bool(result.n_missing),
-    }
-    half, low, high = _ends(result)
-    if half is None:
-        return sentence("sample-size", "no_interval", **words)
-    limit = size.half_width or size.expected_half_width
-    name = "interval" if limit is None else "narrow" if half <= limit else "wide"
-    return sentence(
-        "sample-size",
-        name,
-        **words,
-        half_width=number(half, 3),
-        low=number(low, 3),
-        high=number(high, 3),
-        what="wanted" if size.half_width else "expected",
-        limit=number(limit, 3),
-    )
 
 
 _Ends = tuple[float, float, float] | tuple[None, None, None]

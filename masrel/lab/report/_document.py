@@ -62,29 +62,29 @@ Progress = Callable[[str], object]
 
 
 SECTIONS: dict[str, tuple[str, str, Callable[[Material], Iterable[Content]]]] = {
-    "agreement": ("Agreement", "Estimates in full", estimates_section),
-    "grades": ("Grades", "Tables of grades", grades_section),
-    "confusion": ("Where raters disagree", "Grades by intended one", confusion_section),
-    "test-retest": ("Reliability over time", "Test-retest agreement", retest_section),
     "design": ("", "Design", design_section),
-    "traces": ("What was presented", "Torque traces", traces_section),
-    "methods": ("Methods", "References", methods_section),
     "flow": ("", "Flow of the raters", flow_section),
     "conduct": ("", "Conduct", conduct_section),
     "sample-size": ("", "Sample size", sample_size_section),
+    "agreement": ("Agreement", "Estimates in full", estimates_section),
+    "grades": ("Grades", "Tables of grades", grades_section),
     "categories": ("", "Agreement on each grade", categories_section),
     "intended": ("", "Agreement with the intended grade", intended_section),
+    "confusion": ("Where raters disagree", "Grades by intended one", confusion_section),
+    "test-retest": ("Reliability over time", "Test-retest agreement", retest_section),
     "in-person": ("", "In-person and haptic grades", in_person_section),
     "order": ("", "Effects of order", order_section),
     "speeds": ("", "Stretching speeds", speeds_section),
+    "traces": ("What was presented", "Torque traces", traces_section),
     "questionnaires": ("", "Questionnaires", questionnaires_section),
     # masrel audit has what it showed
     "claims": ("", "Published numbers", lambda _: ()),
+    "methods": ("Methods", "References", methods_section),
 }
 """The headings of each section and what it says, by its name in ``report.sections``.
 
-The first heading is that in the main part, whose order this is, if the section has
-anything there; the second that in the supplement. Flow and conduct are nowhere named.
+In the order in which they come: the first heading is that in the main part, if the
+section has anything there, the second that in the supplement.
 """
 
 _INPUTS = {
@@ -118,7 +118,7 @@ def _parts(
 ) -> tuple[list[Section], list[Section]]:
     # the main part and the supplement, of sections that have something to show
     made = {name: made_section(name, material) for name in names}
-    main = [made[name][0] for name in SECTIONS if name in made and made[name][0].blocks]
+    main = [first for first, _, _ in made.values() if first.blocks]
     more = [second for _, second, _ in made.values() if second.blocks]
     if not main:
         main, more = more, []
@@ -174,9 +174,8 @@ def write_report(
     """Write the report a protocol asks for.
 
     It begins with what the study came to, in sentences. Of the sections only those are
-    made that `masrel.lab.protocol.report_sections` names: first what is in the main
-    part, then the supplement, in that order; matplotlib is loaded when a section has a
-    figure.
+    made that `masrel.lab.protocol.report_sections` names: what is in the main part,
+    then the supplement; matplotlib is loaded when a section has a figure.
 
     Parameters
     ----------
@@ -281,13 +280,9 @@ def make_report(
 
 def section_names(protocol: Protocol, *, is_sealed: bool) -> list[str]:
     """Return the names of the sections that a report can have, in their order."""
-    if is_sealed:
-        return ["flow", "conduct"]
-    names = list(report_sections(protocol))
-    place = names.index("design") + 1 if "design" in names else 0
-    # no protocol names them: they are there where there is anything to say
-    names[place:place] = ("flow", "conduct")
-    return names
+    # no protocol names the two: they are there where there is anything to say
+    named = {"flow", "conduct", *(() if is_sealed else report_sections(protocol))}
+    return [name for name in SECTIONS if name in named]
 
 
 def _block(

@@ -21,13 +21,20 @@ from masrel.lab.report._material import (
     NOTHING,
     SUPPLEMENT,
     Material,
-    are_too_few,
-    interval_cells,
+    few,
     lacking,
 )
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
-from masrel.tables._tables import Column, Table, Value, counted, number, percent
+from masrel.tables._tables import (
+    Column,
+    Table,
+    Value,
+    counted,
+    interval_text,
+    number,
+    percent,
+)
 
 _MODEL = Column(key="model", heading="Model", align="left")
 
@@ -39,11 +46,14 @@ def grades_section(material: Material) -> Iterator[Content]:
         yield lacking("there are no ratings")
     elif felt:
         yield Paragraph(text=felt)
-    blocks: list[Content] = []
-    for session in material.sessions:
-        grid = _grid(material, session)
-        is_many = len(grid.raters) > MANY_RATERS
-        blocks += (_counted_blocks if is_many else _grid_blocks)(material, grid)
+    grids = [_grid(material, session) for session in material.sessions]
+    blocks = [
+        block
+        for grid in grids
+        for block in (
+            _counted_blocks if len(grid.raters) > MANY_RATERS else _grid_blocks
+        )(material, grid)
+    ]
     yield from (block for block in blocks if isinstance(block, Drawing))
     yield SUPPLEMENT
     yield from (block for block in blocks if isinstance(block, Table))
@@ -331,7 +341,7 @@ def confusion_section(material: Material) -> Iterator[Content]:
     grades, level = material.ratings.scale.grades, material.analysis.level
     caption = f"Grades given for each intended grade, session {session}"
     shares = _shares(by_rater, [grades.index(aim) for aim in intended], level)
-    few = are_too_few(counted(by_rater.shape[1], "rater"))
+    n_raters = counted(by_rater.shape[1], "rater")
     drawn = shares.copy()
     drawn[1:, shares[2] - shares[1] >= NOTHING] = np.nan
     counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
@@ -371,13 +381,11 @@ def confusion_section(material: Material) -> Iterator[Content]:
         ),
         rows=tuple(
             (
-                aim,
-                *of_aim,
-                sum(of_aim),
-                value,
-                *interval_cells(*ends, few=few, whole=100.0),
+                *(aim, *of_aim, sum(of_aim), value),
+                few((low, high), n_raters, whole=100.0) or interval_text(low, high, 1),
+                *(low, high),
             )
-            for aim, of_aim, (value, *ends) in zip(
+            for aim, of_aim, (value, low, high) in zip(
                 intended, counts.tolist(), (100.0 * shares.T).tolist(), strict=True
             )
         ),
@@ -422,7 +430,7 @@ def questionnaires_section(material: Material) -> Iterator[Content]:
     """Show how each question was answered, over all raters."""
     summaries = material.analysis.questionnaires
     if not any(summary.n for summary in summaries):
-        yield lacking("there are no answers")
+        yield from [lacking("there are no answers")] * bool(summaries)
         return
     made_up = [_RECONSTRUCTED] * any(each.is_reconstructed for each in summaries)
     questions = [

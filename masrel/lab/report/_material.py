@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from masrel.agreement import COEFFICIENTS
-from masrel.estimates import Estimate, Interval
+from masrel.estimates import Estimate
 from masrel.lab.analysis import Analysis, PlannedEstimate
 from masrel.lab.protocol import EstimatePlan, Protocol
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.lab.report._pages import TEMPLATES
 from masrel.pages._sections import Paragraph, template_environment
-from masrel.tables._estimate_words import Noun, origin, promise
 from masrel.tables._tables import (
     INTERIM,
     SIMULATED_DEVICE,
@@ -23,7 +22,6 @@ from masrel.tables._tables import (
     as_entered,
     capital,
     counted,
-    interval_text,
     joined,
     number,
     percent,
@@ -138,11 +136,16 @@ _SENTENCES: dict[str, dict[str, str]] = tomllib.loads(_FILE.read_text("utf-8"))
 def macros(name: str, words: Mapping[str, object]) -> Any:
     """Return the macros of a template of texts, which know these words and a few."""
     shared: tuple[Callable[..., str], ...] = (
-        *(as_entered, capital, counted, joined, number, percent),
+        *(as_entered, capital, counted, joined, number, percent, too_few),
     )
     environment = template_environment(TEMPLATES).overlay(finalize=_in_one_line)
     known = {word.__name__: word for word in shared}
     return environment.get_template(name).make_module({**known, **words})
+
+
+def text_of(name: str, macro: str, *values: object) -> str:
+    """Return what a macro of a template of texts says of values, as one paragraph."""
+    return " ".join(lines_of(getattr(macros(name, {}), macro)(*values)))
 
 
 def lines_of(text: object) -> list[str]:
@@ -182,23 +185,19 @@ def coefficient_name(coefficient: str, weights: str = "identity") -> str:
 
 def estimate_titles(lines: Sequence[EstimatePlan]) -> dict[str, str]:
     """Return what each line of a plan is called, by its id."""
-    titles = {}
-    for line in lines:
-        name = coefficient_name(line.coefficient, line.weights)
-        again = " in two sessions" * (line.kind == "test-retest")
-        titles[line.id] = line.title or f"{name}, {line.models} models{again}"
-    # those that are called the same, also by their populations, or else their ids
-    parts: tuple[Callable[[EstimatePlan], str], ...] = (
-        lambda line: f", for {TARGETS[line.target]}",
-        lambda line: f" ({line.id})",
-    )
-    for part in parts:
+    titles = {
+        line.id: line.title
+        or f"{coefficient_name(line.coefficient, line.weights)}, {line.models} models"
+        + ", retest" * (line.kind == "test-retest")
+        for line in lines
+    }
+    # those that are called the same also by their populations, or else their ids
+    for key in ("target", "id"):
         alike = Counter(titles.values())
-        titles |= {
-            line.id: titles[line.id] + part(line)
-            for line in lines
-            if alike[titles[line.id]] > 1
-        }
+        for line in lines:
+            if alike[titles[line.id]] > 1:
+                part = str(getattr(line, key))
+                titles[line.id] += f", {TARGETS.get(part, part)}"
     return titles
 
 
@@ -207,50 +206,30 @@ INTERVAL = (
     Column(key="low", heading="Low", where="csv"),
     Column(key="high", heading="High", where="csv"),
 )
-"""Columns of `interval_cells`."""
+"""Columns of an interval: as shown, and its ends."""
 
 NOTHING = 0.9
 """The width of an interval, of all that there is, from which on it says nothing."""
 
 
-def interval_cells(
-    low: float, high: float, *, few: str, whole: float = 1.0
-) -> tuple[str, float, float]:
-    """Return an interval as shown, or that it rests on too few, and its ends."""
-    text = interval_text(low, high, 3 if whole == 1.0 else 1)
-    return few if high - low >= NOTHING * whole else text, low, high
-
-
-def are_too_few(*counts: str) -> str:
-    """Say that something is too little for an interval."""
-    is_one = len(counts) == 1 and counts[0].startswith("1 ")
-    return f"{joined(counts)} {'is' if is_one else 'are'} too few"
+def few(ends: Sequence[float], *counts: str, whole: float = 1.0) -> str:
+    """Return that an interval says nothing, being of so few; nothing if it does."""
+    are = "are" if counts[-1].endswith("s") else "is"
+    is_wide = ends[1] - ends[0] >= NOTHING * whole
+    return f"{joined(counts)} {are} too few" * is_wide
 
 
 def too_few(estimate: Estimate) -> str:
-    """Return why an interval is not shown that says nothing; else nothing."""
-    interval, in_units = estimate.interval, COEFFICIENTS[estimate.coefficient].in_units
-    if interval is None or in_units or not interval.high - interval.low >= NOTHING:
+    """Return that the interval of an estimate says nothing; nothing if it does."""
+    interval = estimate.interval
+    if interval is None or COEFFICIENTS[estimate.coefficient].in_units:
         return ""
-    names = {"items": "model", "raters": "rater"}
     counts = {
-        name: counted(getattr(estimate, f"n_{name}"), of) for name, of in names.items()
+        "raters": counted(estimate.n_raters, "rater"),
+        "items": counted(estimate.n_items, "model"),
     }
-    return are_too_few(
-        *(of for name, of in counts.items() if interval.target in (name, "both"))
-    )
-
-
-def interval_name(interval: Interval) -> str:
-    """Return level, kind and method of an interval."""
-    return f"{percent(interval.level)} % {interval.kind}, {interval.method}"
-
-
-def meaning(interval: Interval, noun: Noun = "model") -> str:
-    """Return in one sentence what an interval promises and what it was made from."""
-    kind = "bound" if interval.is_one_sided else "interval"
-    name = f"{interval.kind.capitalize()} {kind}"
-    return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
+    of = [text for name, text in counts.items() if interval.target in (name, "both")]
+    return few((interval.low, interval.high), *of)
 
 
 def at_ranks(values: Sequence[float]) -> dict[str, int]:

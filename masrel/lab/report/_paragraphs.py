@@ -25,6 +25,7 @@ from masrel.lab.report._material import (
     lines_of,
     macros,
     main_estimate,
+    too_few,
 )
 from masrel.lab.report._order_tables import effect_rows
 from masrel.lab.run._state import FROM_PERSONS
@@ -89,9 +90,10 @@ def _further(analysis: Analysis, line: EstimatePlan) -> Iterator[Interval]:
     # intervals of the same number for other populations
     keys = ("kind", "coefficient", "weights", "models", "sessions")
     for other in analysis.estimates:
-        interval = None if other.estimate is None else other.estimate.interval
+        estimate, interval = other.estimate, getattr(other.estimate, "interval", None)
         is_one = all(getattr(other.line, k) == getattr(line, k) for k in keys)
-        if interval is not None and is_one and other.line.target != line.target:
+        is_one &= other.line.target != line.target
+        if estimate and interval and is_one and not too_few(estimate):
             yield from [interval] * (not math.isnan(interval.low))
 
 

@@ -37,6 +37,9 @@ from masrel.lab.report._material import (
     Material,
     at_ranks,
     lacking,
+    lines_of,
+    macros,
+    text_of,
 )
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
@@ -64,36 +67,41 @@ def speeds_section(material: Material) -> Iterator[Content]:
     if speeds is None or not speeds.values:
         yield lacking(None if speeds is None else speeds.reason)
         return
-    text = (
-        "Mean speed of the phase before the catch, which sets the catch angle by "
-        "equation (2); below ν_L the catch angle no longer changes."
-    )
-    if speeds.n_missing:
-        text += f" Ratings whose speed is not known: {speeds.n_missing}."
-    if _has_many(speeds.values):
-        text += (
-            " Where a rater stretched the arm more than once, n counts stretches that "
-            "reached ν_th."
-        )
+    has_many = _has_many(speeds.values)
+    text = text_of("speeds.txt", "speeds", speeds.n_missing, has_many)
     yield Paragraph(text=text)
-    digits = _whole_or_tenths([speed.mean_speed_deg_s for speed in speeds.values])
-    yield _speeds_table(material, speeds.by_model, "model", digits)
+    by_model, by_rater = speed_tables(material)
+    yield by_model
     texts = "; ".join(
         f"{s.name} in {s.session}: mean {number(s.mean, 0)}, "
         f"{number(s.least, 0)} to {number(s.most, 0)} deg/s"
         for s in speeds.by_model
     )
     slowest = material.protocol.elbow.slowest_mean_speed_deg_s
+    n_raters = len(material.raters)
     yield Drawing(
         name="speeds",
-        caption=_speeds_caption(len(material.raters), speeds.values),
+        caption=text_of(
+            *("speeds.txt", "speeds_caption", n_raters, n_raters > MANY_RATERS),
+            *(has_many, any(speed.is_graded for speed in speeds.values)),
+        ),
         alt=f"Dot plot of speeds. {texts}.",
         content=Drawn(
             FIGURES + "_study_figures:speed_figure", (speeds, material.raters, slowest)
         ),
         stamp=material.stamp,
     )
-    yield _speeds_table(material, speeds.by_rater, "rater", digits)
+    yield by_rater
+
+
+def speed_tables(material: Material) -> list[Table]:
+    """Return the mean speeds per model and per rater; nothing where none is known."""
+    speeds = material.analysis.speeds
+    if speeds is None or not speeds.values:
+        return []
+    digits = _whole_or_tenths([speed.mean_speed_deg_s for speed in speeds.values])
+    by = {"model": speeds.by_model, "rater": speeds.by_rater}
+    return [_speeds_table(material, of, name, digits) for name, of in by.items()]
 
 
 def _speeds_table(
@@ -130,22 +138,6 @@ def _speeds_table(
         notes=(note.format(" and ".join(counts)),) if counts else (),
         data=material.data,
     )
-
-
-def _speeds_caption(n_raters: int, speeds: Sequence[Speed]) -> str:
-    dashed = "Dashed: ν_L, below which the catch angle stays the same."
-    if n_raters > MANY_RATERS:
-        return (
-            f"Mean stretching speeds of {n_raters} raters for every model: the middle "
-            f"50 % (broad), the middle 90 % (thin) and the mean (bar). {dashed}"
-        )
-    of = "rater for every model, and the mean over raters"
-    if _has_many(speeds):
-        of = "stretch of every rater for every model, and the mean over stretches"
-    caption = f"Mean stretching speed of every {of} (bar). {dashed}"
-    if any(speed.is_graded for speed in speeds):
-        caption += " Ringed: the stretch that the rater said the grade rests on."
-    return caption
 
 
 def _has_many(speeds: Sequence[Speed]) -> bool:
@@ -189,10 +181,13 @@ def traces_section(material: Material) -> Iterator[Content]:
     session = next(s for s in material.sessions if s in {v.session for v in moved})
     values = [value for value in moved if value.session == session]
     end_deg = min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
-    text = _traces_text(material, values, end_deg)
     n_still = sum(v.session == session for v in speeds.values) - len(values)
-    if n_still:
-        text += f" Speeds {_TOO_SLOW}, which are not drawn: {n_still}."
+    n_most = max(Counter(value.model for value in values).values())
+    text = text_of(
+        *("speeds.txt", "traces", material.origin, protocol.stretch.start_deg, end_deg),
+        *(session, _has_many(values), MANY_STRETCHES if n_most > MANY_STRETCHES else 0),
+        *(any(value.is_graded for value in values), _TOO_SLOW, n_still),
+    )
     yield Paragraph(text=text)
     models = [
         _traced(protocol, model, of_model, end_deg)
@@ -208,28 +203,6 @@ def traces_section(material: Material) -> Iterator[Content]:
             yield SUPPLEMENT
     yield _peak_table(material, models, session)
     yield from measured_blocks(material)
-
-
-def _traces_text(material: Material, values: Sequence[Speed], end_deg: float) -> str:
-    # the values are of one session
-    kind = {
-        "published": "published mean speeds",
-        "simulated": "mean speeds of the simulated hands",
-        "simulated device": "mean speeds of the simulated hands",
-    }.get(material.origin, "recorded mean speeds")
-    each = "stretch" if _has_many(values) else "rater"
-    most = max(Counter(value.model for value in values).values())
-    of_many = f", or a few of more than {MANY_STRETCHES}" * (most > MANY_STRETCHES)
-    text = (
-        "These traces are reconstructions, not measurements: each model is stretched "
-        f"at constant speed from {as_entered(material.protocol.stretch.start_deg)}° to "
-        f"{as_entered(end_deg)}°, at the {kind} of session "
-        f"{values[0].session}, one line a {each}{of_many}. Torque resists extension; "
-        "the arm's own inertia is not in it."
-    )
-    if any(value.is_graded for value in values):
-        text += " A thicker line is the stretch that the rater said the grade rests on."
-    return text
 
 
 def _traced(
@@ -305,13 +278,7 @@ def _traces_drawing(
     material: Material, models: Sequence[TracedModel], nth: int, *, has_angle: bool
 ) -> Drawing:
     listed = ", ".join(model.id for model in models)
-    shape = (
-        "Torque rises slowly, jumps at the catch, falls to a residual, and rises again "
-        "after the catch; the"
-    )
-    if not all(isinstance(model.joint, ElbowParameters) for model in models):
-        shape = "The"
-    what = "Torque and angle" if has_angle else "Torque"
+    is_elbow = all(isinstance(model.joint, ElbowParameters) for model in models)
     panels = tuple(
         (
             *(model.title, model.lines, [speed.is_graded for speed in model.shown]),
@@ -321,46 +288,19 @@ def _traces_drawing(
         for model in models
     )
     content = (panels, "time" if has_angle else "small")
+    phases = np.unique(np.concatenate([of.phase for m in models for of in m.lines]))
+    speeds = [speed for model in models for speed in model.speeds]
+    n_most = max((len(m.speeds) for m in models if m.band is not None), default=0)
     return Drawing(
         name=f"traces_{nth}",
-        caption=_traces_caption(models, listed, has_angle=has_angle),
-        alt=(
-            f"{what} against time for {listed}. {shape} "
-            "peaks are in the table of peak torques."
+        caption=text_of(
+            *("speeds.txt", "traces_caption", listed, has_angle, _has_many(speeds)),
+            *(n_most, phases.tolist()),
         ),
+        alt=text_of("speeds.txt", "traces_alt", listed, has_angle, is_elbow),
         content=Drawn(FIGURES + "_stretch_figures:trace_figure", content),
         stamp=material.trace_stamp,
     )
-
-
-def _traces_caption(
-    models: Sequence[TracedModel], listed: str, *, has_angle: bool
-) -> str:
-    every = (
-        "stretch's" if _has_many([s for m in models for s in m.speeds]) else "rater's"
-    )
-    what = "torque (top) and angle (bottom)" if has_angle else "torque"
-    met = np.unique(np.concatenate([line.phase for m in models for line in m.lines]))
-    words = "; ".join(_PHASE_LOOKS[code] for code in met)
-    # one phase has nothing to be told from
-    looks = f"{words}; a dot marks where a phase begins." if len(met) > 1 else ""
-    n_most = max((len(m.speeds) for m in models if m.band is not None), default=0)
-    speeds, shaded = f"every {every} mean speed.", ""
-    if n_most:
-        speeds = f"the mean speeds of up to {n_most} stretches."
-        shaded = (
-            "Shaded: the middle 50 % and 90 % at each time, while half of the "
-            "stretches go on. Lines: the slowest, the median and the fastest, each "
-            "with its rater. "
-        )
-    return f"Reconstructed {what} of {listed} at {speeds} {shaded}{looks}".rstrip()
-
-
-_PHASE_LOOKS = (
-    "Thin grey: before the catch",
-    "thick: catch",
-    "dashed: after the catch",
-)
 
 
 def _peak_table(
@@ -374,18 +314,10 @@ def _peak_table(
     is_many = len(raters) > MANY_RATERS
     where: Literal["csv", "everywhere"] = "csv" if is_many else "everywhere"
     made = [speed for model in models for speed in model.speeds]
-    notes = [
-        "The largest torque of all phases, be it in the catch or at the end of the "
-        "stretch, computed from the exact events of the motion, not from the samples."
-    ]
-    if others := [m.id for m in models if not isinstance(m.joint, ElbowParameters)]:
-        notes.append(f"Of {', '.join(others)} it is the largest sample.")
-    if _has_many(made):
-        notes.append("Of several stretches the largest peak is given.")
-    elif len({(speed.model, speed.rater) for speed in made}) < len(made):
-        notes.append("Of repeated presentations the largest peak is given.")
-    if is_many:
-        notes.append(f"The file has the peaks of all {len(raters)} raters.")
+    others = [m.id for m in models if not isinstance(m.joint, ElbowParameters)]
+    is_again = len({(speed.model, speed.rater) for speed in made}) < len(made)
+    say = macros("speeds.txt", {})
+    notes = say.peaks(others, _has_many(made), is_again, len(raters) * is_many)
     return Table(
         name="peak_torque",
         caption=(
@@ -408,7 +340,7 @@ def _peak_table(
             )
             for of_model, model in zip(peaks, models, strict=True)
         ),
-        notes=tuple(notes),
+        notes=tuple(lines_of(notes)),
         data=material.data,
     )
 

@@ -269,18 +269,11 @@ def _of_logs(
 
 def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     # of everything that was made from the logs
-<<<<<<< HEAD
     if is_cut_off(study.report):
         yield stale(study.report, CUT_OFF)
     table, manifest = study.ratings_file, study.report / MANIFEST
-    tables = (table, study.answers_file, study.raters_file)
-    outputs = (*tables, study.analysis_file, manifest)
-    files = [file for file in outputs if file.is_file()]
-=======
-    table, manifest = study.ratings_file, study.report / _MANIFEST
     outputs = (table, study.answers_file, study.raters_file, study.analysis_file)
     files = [file for file in (*outputs, manifest) if file.is_file()]
->>>>>>> plan37
     if not files:
         return  # nothing is loaded for it
     computed: dict[str, dict[str, str]] = {}
@@ -456,7 +449,6 @@ def _report_findings(
     if not isinstance(files, dict) or not isinstance(inputs, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
         return
-<<<<<<< HEAD
     if (of_format := document.get("format")) == _HASHED_NAMES:
         yield stale(
             manifest,
@@ -466,13 +458,6 @@ def _report_findings(
     elif of_format != _REPORT_FORMAT:
         needed = f"needed format {_REPORT_FORMAT!r}, got {of_format!r}"
         yield broken(manifest, needed)
-=======
-    if document.get("format") != _REPORT_FORMAT:
-        yield broken(
-            manifest,
-            f"needed format {_REPORT_FORMAT!r}, got {document.get('format')!r}",
-        )
->>>>>>> plan37
         return
     beside = ("include", "claims_sha256")  # what is shown of the same, and of others
     of = {key: value for key, value in inputs.items() if key not in beside}

@@ -51,7 +51,7 @@ def test_the_tables_are_printed_and_the_analysis_written(
     assert "[0.320, 0.933]" in done.out
     assert "84.4 %" in done.out
     assert "11 of 11 pairs are equal" in done.out
-    assert "in two sessions: there are no ratings of session retest" in done.out
+    assert "retest: there are no ratings of session retest" in done.out
     assert done.err == (
         f"read: 32 ratings from {study / 'ratings' / 'published.csv'}\n"
         f"analysis: {study / 'analysis.json'}\n"

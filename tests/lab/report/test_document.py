@@ -171,10 +171,10 @@ def _is_shown_as(value: str, cell: str) -> bool:
     return abs(float(cell.replace("−", "-")) - float(value)) <= 0.5000001 * 10**-digits
 
 
-def test_sections_come_in_the_protocols_order_and_no_others(tmp_path: Path) -> None:
+def test_only_the_sections_that_a_protocol_names_are_there(tmp_path: Path) -> None:
     files = published_report(tmp_path, "speeds", "intended")
     _, *sections = page_of(files).headings
-    titles = ["Stretching speeds", "Agreement with the intended grade", "Provenance"]
+    titles = ["Agreement with the intended grade", "Stretching speeds", "Provenance"]
     assert sections == titles
     assert {path.stem for path in files.tables} == {
         "speeds_by_model",

@@ -122,12 +122,12 @@ def interval(**changes: Any) -> Interval:
     return Interval(**{**made, **changes})
 
 
-def one(**changes: Any) -> PlannedEstimate:
+def one(id_: str = "kappa", **changes: Any) -> PlannedEstimate:
     made: dict[str, Any] = {"coefficient": "fleiss_kappa", "weights": "identity"}
     made |= {"value": 0.626083678854127, "standard_error": 0.1, "observed": 81 / 112}
     made |= {"chance": 266 / 1024, "n_items": 4, "n_items_paired": 4, "n_raters": 8}
     estimate = Estimate(**{**made, "n_categories": 6, **changes})
-    line = plan(id="kappa", coefficient=estimate.coefficient)
+    line = plan(id=id_, coefficient=estimate.coefficient)
     return PlannedEstimate(line=line, estimate=estimate)
 
 
@@ -150,9 +150,8 @@ def test_the_csv_has_every_number_and_the_page_one_interval(tmp_path: Path) -> N
     assert head == ["Estimate", "Value", "Interval", "Models", "Raters"]
     assert row == ["Fleiss' κ, standard models", "0.626", "[0.320, 0.933]", "4", "8"]
     assert [cells[: len(head)] for cells in full] == [head, row]
-    assert [full[1][at] for at in (5, 6, 8)] == [
-        "95 % confidence, jackknife, t(7)", "other raters", "fair",
-    ]  # fmt: skip
+    assert full[0][len(head) :] == ["At least", "p_o", "p_e"]
+    assert full[1][len(head) :] == ["fair", "0.723", "0.260"]
     assert "Intervals of 95 %: confidence for other raters." in text
     expected = {"value": "0.626083678854127", "low": "0.31957", "high": "0.93252"}
     expected |= {"interval": "95 % confidence, jackknife, t(7)", "n_items": "4"}
@@ -173,7 +172,7 @@ def test_intervals_made_alike_share_a_meaning_and_wide_ones_are_not_shown(
     assert [row[2] for row in rows[:7]] == [
         "[0.320, 0.933]", "[0.100, 0.933]", "[0.320, 0.933]", "–",
         "4 models are too few", "8 raters are too few",
-        "4 models and 8 raters are too few",
+        "8 raters and 4 models are too few",
     ]  # fmt: skip
     assert cells[4]["low"] == "-0.2"  # the file has it
     assert "0.626 [-0.2" not in text.replace("−", "-")  # of the forest
@@ -186,18 +185,18 @@ def test_an_estimate_has_a_title_of_its_own_or_one_that_no_other_has() -> None:
         plan(id="a"), plan(id="b", target="items"), plan(id="c", target="items"),
         plan(id="d", title="My κ"), plan(id="e", models="dummy"), AGAIN,
     ]  # fmt: skip
-    kappa = "Fleiss' κ, standard models, for other"
+    kappa = "Fleiss' κ, standard models, other"
     assert list(estimate_titles(lines).values()) == [
-        f"{kappa} raters", f"{kappa} models (b)", f"{kappa} models (c)", "My κ",
-        "Fleiss' κ, dummy models", "Stratified κ, standard models in two sessions",
+        f"{kappa} raters", f"{kappa} models, b", f"{kappa} models, c", "My κ",
+        "Fleiss' κ, dummy models", "Stratified κ, standard models, retest",
     ]  # fmt: skip
 
 
 def test_what_a_reader_must_know_is_below_the_table(tmp_path: Path) -> None:
-    nan = one(value=math.nan, reason="all ratings are in one category")
+    nan = one("nan", value=math.nan, reason="all ratings are in one category")
     lost = PlannedEstimate(line=plan(id="lost"), reason="there are no ratings")
-    warned = one(interval=interval(notes=("4 items: below 10.",), n_undefined=3))
-    share = one(coefficient="percent_agreement")
+    warned = one(interval=interval(notes=("4 items: below 10",), n_undefined=3))
+    share = one("share", coefficient="percent_agreement")
     (_, *rows), cells, text = shown(tmp_path, nan, lost, warned, share)
     assert [row[1] for row in rows[:4]] == ["undefined", "–", "0.626", "0.626"]
     words = [row["strength"] for row in cells]
@@ -208,10 +207,10 @@ def test_what_a_reader_must_know_is_below_the_table(tmp_path: Path) -> None:
     for note in (
         "\n\nNot in these data: there are no ratings.\n",
         "\n\nUndefined: all ratings are in one category.\n",
-        " models: all ratings are in one category.",
-        "Fleiss' κ, standard models: there are no ratings.",
-        " models: 4 items: below 10.",
-        " models: undefined on 3 resamples.",
+        ": undefined: all ratings are in one category.",
+        "lost: there are no ratings.",
+        "\n\n4 items: below 10.\n",
+        ", kappa: undefined on 3 resamples.",
     ):
         assert note in text
 
@@ -222,7 +221,8 @@ BOTH = "other raters graded other models, both like these"
 GIVEN = "given these ratings, the prior and"
 MEANT: list[tuple[dict[str, Any], str]] = [
     ({"kind": "credible", "target": "items"},
-     "Credible interval: given these ratings and the prior, the value that would be "
+     "95 % credible interval, jackknife, t(7): generalises to other models like these: "
+     "given these ratings and the prior, the value that would be "
      f"found if {OTHER_ITEMS}, without end, lies inside with probability 95 %."),
     ({"kind": "credible", "target": "both"},
      f"{GIVEN} raters who differ by chance alone, the value that would be found if "
@@ -231,17 +231,21 @@ MEANT: list[tuple[dict[str, Any], str]] = [
      f"{GIVEN} the model of how raters differ, the value that would be found if "
      f"{OTHER_RATERS}, without end, lies inside"),
     ({"kind": "credible", "target": "items", "is_one_sided": True},
-     "Credible bound: given these ratings and the prior, the value that would be found "
+     "credible bound, jackknife, t(7): generalises to other models like these: given "
+     "these ratings and the prior, the value that would be found "
      f"if {OTHER_ITEMS}, without end, lies above the lower end"),
     ({"target": "both"},
-     f"Confidence interval: if {BOTH}, again and again, about 95 % of the intervals "
+     "95 % CI, jackknife, t(7): generalises to other models and raters like these"
+     f": if {BOTH}, again and again, about 95 % of the intervals "
      "made this way would hold the value that all such studies together would give."),
     ({"unit": "items", "units_are": "left out", "target": "items"},
-     f"(from leaving out one model at a time): if {OTHER_ITEMS},"),
+     "(from leaving out one model at a time): generalises to other models like these: "
+     f"if {OTHER_ITEMS},"),
     ({"unit": "both", "units_are": "left out", "target": "both"},
-     f"(from leaving out models and raters, one at a time): if {BOTH},"),
+     "(from leaving out models and raters, one at a time): generalises to"),
     ({"unit": "raters", "units_are": "drawn"},
-     f"(from raters drawn with replacement): if {OTHER_RATERS},"),
+     "(from raters drawn with replacement): generalises to other raters like these: "
+     f"if {OTHER_RATERS},"),
     ({"unit": "clusters", "target": "items"},
      "if these raters graded other clusters of models like these,"),
 ]  # fmt: skip

@@ -234,8 +234,7 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     "the word that agree has for it, whose interval ends in 'fair'": (
         study(plan(interval="posterior", target="items"), sections=("agreement",)),
         table_v(),
-        ["| [0.370, 0.874] | 4 | 8 |", "| test | moderate |",
-         "by its interval (one-sided)"],
+        ["| [0.370, 0.874] | 4 | 8 | moderate |", "by its interval (one-sided)"],
     ),
     "no estimate, so no grade": (
         study(sections=("categories",)), table_v(),
