@@ -341,7 +341,7 @@ def _numbers_findings(
 
     def difference(then: Protocol) -> str | None:
         # an earlier version may have written ratings in another format
-        former = None if numbers else made_of.get("ratings_sha256")
+        former = made_of.get("ratings_sha256")
         material, inputs = _material(study, then, former)
         seen[inputs["protocol_sha256"]] = inputs.get("in_person_sha256")
         beside = {"conduct_sha256": report and conduct_hash(study)}
@@ -405,7 +405,8 @@ def _material(
         ratings = read_study_data(study, protocol, allows_sealed=True).ratings
     in_person, answers = in_person_of(study, ratings), answers_of(study, protocol)
     inputs = _inputs(protocol, ratings, in_person, answers)
-    texts = () if former is None or ratings.source_path else _texts(ratings)
+    is_other = former not in (None, inputs["ratings_sha256"])
+    texts = _texts(ratings) if is_other and not ratings.source_path else ()
     if former in {hashlib.sha256(text.encode()).hexdigest() for text in texts}:
         inputs["ratings_sha256"] = str(former)
     return {
@@ -449,14 +450,8 @@ def _report_findings(
     if not isinstance(files, dict) or not isinstance(inputs, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
         return
-    if (of_format := document.get("format")) == _HASHED_NAMES:
-        yield stale(
-            manifest,
-            "names of tables and figures have hashes, as earlier versions of masrel "
-            "made them: make anew for names that last",
-        )
-    elif of_format != _REPORT_FORMAT:
-        needed = f"needed format {_REPORT_FORMAT!r}, got {of_format!r}"
+    if document.get("format") not in (_REPORT_FORMAT, _HASHED_NAMES):
+        needed = f"needed format {_REPORT_FORMAT!r}, got {document.get('format')!r}"
         yield broken(manifest, needed)
         return
     beside = ("include", "claims_sha256")  # what is shown of the same, and of others

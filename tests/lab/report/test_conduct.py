@@ -149,7 +149,7 @@ def test_a_report_of_before_the_last_event_is_found(
     write_ratings(read_study_data(study, protocol).ratings, study.ratings_file)
     page(study, protocol, "notes")
     assert messages() == []
-    late = "the report is not of what has happened beside the sessions"
+    late = "is of an earlier state of the record"
     for standing in ("withdrawn", "excluded", "included"):
         record_standing(study, protocol, "R3", standing, **BY)
         (message,) = messages()
