@@ -19,13 +19,13 @@ from masrel.pages._methods_text import latent_methods, methods
 from masrel.pages._pictures import PICTURES, PartSeen, forest_drawing, parts_seen
 from masrel.pages._references import reference_texts
 from masrel.pages._sections import (
-    Block,
     Content,
     Document,
     Drawing,
     Paragraph,
     Section,
     chapters,
+    drawn_block,
     html_page,
 )
 from masrel.plots._drawn_values import Drawn
@@ -125,21 +125,11 @@ def _page(
             banner=stamp,
             provenance=" ".join(what_was_read(file, items)),
             result=result,
-            sections=chapters(sections, partial(_block, stamp)),
+            sections=chapters(sections, partial(drawn_block, stamp=stamp)),
             inputs=tuple((name, value) for name, value in known.items() if value),
             version=version("masrel"),
         )
     )
-
-
-def _block(stamp: str, number: str, content: Content) -> Block:
-    pictures: dict[str, bytes] = {}
-    if isinstance(content, Drawing):
-        from masrel.plots import draw  # a page without pictures loads nothing of it
-
-        inline = draw(content.content, stamp=stamp, forms=("inline",))["inline"]
-        pictures = {"inline": inline}
-    return Block(number=number, content=content, pictures=pictures)
 
 
 def _result_section(

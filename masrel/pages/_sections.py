@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from masrel.plots._drawn_values import Drawn
+from masrel.plots._drawn_values import Drawn, Form
 from masrel.tables._tables import SYMBOL, Table, page_cells
 
 if TYPE_CHECKING:
@@ -73,8 +73,8 @@ class Block:
     content: Content
     # of a figure: its bytes by form (inline, png, svg), and, by form, its file from the
     # report's folder
-    pictures: Mapping[str, bytes] = field(default_factory=dict)
-    files: Mapping[str, str] = field(default_factory=dict)
+    pictures: Mapping[Form, bytes] = field(default_factory=dict)
+    files: Mapping[Form, str] = field(default_factory=dict)
 
     @property
     def tables(self) -> list[Table]:
@@ -85,6 +85,22 @@ class Block:
     def kind(self) -> str:
         """What it is: paragraph, table, figure or references."""
         return _KINDS[type(self.content)]
+
+
+def drawn_block(
+    number: str,
+    content: Content,
+    *,
+    stamp: str = "",
+    forms: Sequence[Form] = ("inline",),
+) -> Block:
+    """Return a block, its figure drawn; a stamp stands for one that has none."""
+    pictures: dict[Form, bytes] = {}
+    if isinstance(content, Drawing):
+        from masrel.plots import draw  # a page without pictures loads nothing of it
+
+        pictures = draw(content.content, stamp=content.stamp or stamp, forms=forms)
+    return Block(number=number, content=content, pictures=pictures)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +129,7 @@ class Document:
 
 
 _LETTERS = 106  # of a line of a table on paper
-_WRAPPED = 24  # of a text that goes on in the next line
+_WRAPPED = 14  # of a text that goes on in the next line
 
 
 def narrow(table: Table) -> list[Table]:

@@ -52,8 +52,8 @@ from masrel.pages._sections import (
     References,
     Section,
     chapters,
+    drawn_block,
 )
-from masrel.plots import draw
 from masrel.plots._drawn_values import Form
 from masrel.tables._tables import Table, as_csv, tag_of
 
@@ -299,18 +299,17 @@ def _block(
             assets[_new_place(assets, name, "csv")] = data
     if isinstance(content, References):
         assets[REFERENCES] = content.bibtex.encode()
+    block = drawn_block(number, content, forms=("png", "svg", "inline"))
     if not isinstance(content, Drawing):
-        return Block(number=number, content=content)
-    forms: tuple[Form, ...] = ("png", "svg", "inline")
-    drawn = draw(content.content, stamp=content.stamp, forms=forms)
+        return block
     if progress is not None:
         progress(content.name)
-    pictures = {str(form): picture for form, picture in drawn.items()}
-    files: dict[str, str] = {
-        form: _new_place(assets, f"figures/{content.name}", form) for form in forms[:2]
+    beside: tuple[Form, ...] = ("png", "svg")
+    files = {
+        form: _new_place(assets, f"figures/{content.name}", form) for form in beside
     }
-    assets.update({place: pictures[form] for form, place in files.items()})
-    return Block(number=number, content=content, pictures=pictures, files=files)
+    assets.update({place: block.pictures[form] for form, place in files.items()})
+    return replace(block, files=files)
 
 
 def _new_place(assets: Collection[str], name: str, form: str) -> str:

@@ -18,11 +18,12 @@ from masrel.lab.training._lessons import (
     learning_curve,
 )
 from masrel.pages._sections import (
-    Block,
-    Chapter,
     Document,
     Drawing,
     Paragraph,
+    Section,
+    chapters,
+    drawn_block,
     html_page,
 )
 from masrel.plots._drawn_values import Drawn
@@ -186,9 +187,6 @@ def learning_content(record: TrainingRecord, *, level: float) -> Drawn:
 
 def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -> bytes:
     """Return the page of a training; takes the level of its intervals."""
-    # Imported here: the tables alone load nothing that draws.
-    from masrel.plots import draw
-
     curve, confusion = training_tables(record, level=level)
     drawing = Drawing(
         name="training",
@@ -198,20 +196,15 @@ def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -
         content=learning_content(record, level=level),
         stamp=training_stamp(record, protocol.study.id),
     )
-    picture = draw(drawing.content, stamp=drawing.stamp, forms=("inline",))["inline"]
-    blocks = (
-        Block(number="1", content=Paragraph(text=NOT_RATINGS)),
-        Block(number="1", content=drawing, pictures={"inline": picture}),
-        Block(number="1", content=curve),
-        Block(number="2", content=confusion),
-    )
+    blocks = (Paragraph(text=NOT_RATINGS), drawing, curve, confusion)
+    section = Section(name="training", title="Training", blocks=blocks)
     document = Document(
         title=f"Training of {record.rater}",
         tag=tag_of(curve.data),
         banner=f"{SIMULATED}: no person gave these grades" * record.simulated,
         provenance=f"Study {protocol.study.id}: {protocol.study.title}",
         result=f"Training of {record.rater}: {outcome(record)}.",
-        sections=(Chapter(name="training", title="Training", blocks=blocks),),
+        sections=chapters([section], drawn_block),
         inputs=(("SHA-256 of the protocol", protocol_hash(protocol)),),
         version=__version__,
     )
