@@ -512,7 +512,7 @@ def _row(result: object, place: int) -> dict[str, object]:
 def _with_inputs(part: object, analysis: Analysis) -> dict[str, object]:
     # A line of the plan reads best beside its numbers.
     named = as_plain(part)
-    line = named.pop("line", {})
+    line = {k: v for k, v in named.pop("line", {}).items() if k != "title"}  # in words
     return {**line, **named, "inputs": dict(analysis.inputs)}
 
 
