@@ -454,6 +454,8 @@ def _report_findings(
         needed = f"needed format {_REPORT_FORMAT!r}, got {document.get('format')!r}"
         yield broken(manifest, needed)
         return
+    if document["format"] == _HASHED_NAMES:
+        yield doubt(manifest, "is of an earlier version; masrel report makes it anew")
     beside = ("include", "claims_sha256")  # what is shown of the same, and of others
     of = {key: value for key, value in inputs.items() if key not in beside}
     yield from _numbers_findings(
