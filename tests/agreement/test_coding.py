@@ -343,7 +343,7 @@ def test_what_astype_str_leaves_of_a_missing_rating_is_warned_of(
         with pytest.warns(RatingsWarning) as noted:
             function(ratings)
         assert len(noted) == 1
-        assert f"{text!r} ({n} times)" in str(noted[0].message)
+        assert f"{text!r} ×{n}" in str(noted[0].message)
         assert noted[0].filename == __file__
         function(ratings, categories=sorted(["a", "b", text]))  # and no warning
     plain = fleiss_kappa(FORMS[form]([["b", "a"], ["a", "c"], ["c", "b"]])).value
