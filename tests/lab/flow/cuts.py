@@ -39,7 +39,7 @@ _OPENS = ("open", "openat")
 _WRITES_TEXT = ("write", "writev", "pwrite64")  # which may name a folder
 
 Contents = dict[str, str]
-READY = "\n" * 200_000  # for as many copies of a study as there are
+READY = "\n" * 99
 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 

@@ -18,6 +18,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from click.testing import CliRunner
+
 from masrel.cli import cli
 from masrel.lab.hess import SimulatedClock
 from masrel.lab.protocol import StudyPaths, read_protocol
@@ -81,8 +83,9 @@ def session(root: Path) -> None:
 
 
 def command(call: str, root: Path) -> None:
-    """Call the command line."""
-    cli.main(call.format(root).split(), standalone_mode=False)
+    """Call the command line; whoever it asks presses Enter."""
+    done = CliRunner().invoke(cli, call.format(root).split(), input="\n" * 99)
+    assert done.exit_code == 0, done.output
 
 
 def forked(
