@@ -179,7 +179,7 @@ def _between(before: Any, after: Any, event: Event | None) -> Iterator[PlanChang
     fields = {} if event is None else event.fields
     who, why = (str(fields[key]) if key in fields else None for key in ("who", "why"))
     for key, was, is_ in _content_differences(before, after):
-        if key.startswith(_PLANNED) and not key.endswith(".raters"):
+        if key.startswith(_PLANNED) and not key.endswith((".raters", ".title")):
             yield PlanChange(
                 key=key,
                 before=None if was is None else json.dumps(was, ensure_ascii=False),

@@ -316,7 +316,7 @@ def _forest_line(row: _Row, say: Any, *, has_raters: bool) -> ForestRow:
         estimate = replace(estimate, interval=None)
     if row.rater:
         return forest_row(f"{row.rater}, {row.coefficient}", estimate, group=group)
-    detail = str(say.detail(estimate, row.interval))
+    detail = str(say.detail(row.interval, row.title))
     return forest_row(label, estimate, detail=detail, group=group)
 
 

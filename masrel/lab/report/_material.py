@@ -5,6 +5,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,8 @@ from masrel.tables._tables import (
 )
 
 if TYPE_CHECKING:
+    from jinja2 import Template
+
     from masrel.lab.report._conduct import StudyConduct
 
 FIGURES = "masrel.lab.report."
@@ -138,9 +141,15 @@ def macros(name: str, words: Mapping[str, object]) -> Any:
     shared: tuple[Callable[..., str], ...] = (
         *(as_entered, capital, counted, joined, number, percent, too_few),
     )
-    environment = template_environment(TEMPLATES).overlay(finalize=_in_one_line)
     known = {word.__name__: word for word in shared}
-    return environment.get_template(name).make_module({**known, **words})
+    return _template(name).make_module({**known, **words})
+
+
+@cache
+def _template(name: str) -> "Template":
+    # to compile it takes longer than all that it says
+    environment = template_environment(TEMPLATES).overlay(finalize=_in_one_line)
+    return environment.get_template(name)
 
 
 def text_of(name: str, macro: str, *values: object) -> str:

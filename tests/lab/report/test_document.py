@@ -67,6 +67,23 @@ def test_the_contents_leave_out_what_is_not_in_the_data(published: ReportFiles) 
     assert "there are no ratings of session retest." in text
 
 
+def test_a_main_part_comes_before_a_folded_supplement(published: ReportFiles) -> None:
+    text = published.html.read_text(encoding="utf-8")
+    main, folded, supplement = text.partition("<details>")
+    assert folded
+    names = ["agreement", "grades", "confusion", "traces", "methods"]
+    assert re.findall(r'<section id="([\w-]+)"', main) == names
+    assert "supplement" in re.findall(r'href="#([\w-]+)"', main)
+    for name in ("design", "agreement-more", "speeds", "methods-more"):
+        assert f'<section id="{name}"' in supplement
+    numbers = [re.findall(r"Table (S?\d+)\.<", part) for part in (main, supplement)]
+    assert numbers == [["1"], [f"S{n}" for n in range(1, len(numbers[1]) + 1)]]
+    markdown = published.markdown.read_text(encoding="utf-8")
+    assert re.findall("^## (.*)$", markdown, re.M)[-3:] == [
+        "Methods", "Supplement", "Provenance",
+    ]  # fmt: skip
+
+
 def test_no_file_holds_a_time_of_day(published: ReportFiles) -> None:
     folder = published.html.parent
     for name, data in contents(folder).items():
