@@ -432,8 +432,9 @@ def test_the_same_presentation_twice_is_the_same_to_the_last_bit() -> None:
 
 def test_with_a_real_clock_it_goes_the_same_way() -> None:
     # A short stretch, 100 to 146 deg at 110 deg/s: about 0.6 s with the rests. How
-    # late the machine is may differ, so every tick may be missed without a fault.
-    limits = DeviceLimits(missed_ticks=2_000, watchdog_time=1.0)
+    # late the machine is may differ, so every tick may be missed without a fault, and
+    # a reading may be as old as the machine was away.
+    limits = DeviceLimits(missed_ticks=2_000, watchdog_time=1.0, stale_time=0.5)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OverrunWarning)
         real, simulated = (
