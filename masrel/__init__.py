@@ -6,6 +6,7 @@ Statistics, for anybody with ratings::
     agreement   coefficients of agreement, from any table of ratings
     intervals   intervals for them: analytic, jackknife, bootstrap, posterior
     planning    how large a study must be
+    judges      whether a model rates as well as the people, and what follows if not
     audit       whether the numbers that a paper prints can be
 
 and `masrel.lab`, the laboratory, which stands on them and which they never import.
@@ -31,6 +32,7 @@ __all__ = [
     "agreement",
     "audit",
     "intervals",
+    "judges",
     "lab",
     "planning",
     "ratings",

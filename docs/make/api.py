@@ -16,6 +16,7 @@ MODULES = (
     "masrel.intervals",
     "masrel.audit",
     "masrel.planning",
+    "masrel.judges",
     "masrel.ratings",
     "masrel.plots",
     "masrel.scales",

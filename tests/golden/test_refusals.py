@@ -28,7 +28,9 @@ DATA: dict[str, Any] = TABLE.pop("data")
 STUDIES: dict[str, list[str]] = TABLE.pop("studies")
 SETUP: list[str] = TABLE.pop("setup")
 
-STATISTICS = ("agreement", "intervals", "ratings", "planning", "audit", "scales")
+STATISTICS = (
+    *("agreement", "intervals", "ratings", "planning", "audit", "judges", "scales"),
+)
 LABORATORY = (
     *("protocol", "schedule", "run", "recording", "elbow", "elbow.tone"),
     *("elbow.identification", "hess", "hess.puck", "ratings"),
