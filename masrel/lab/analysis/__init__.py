@@ -4,7 +4,8 @@ In: a protocol, its ratings and grades given in person. Out: an `Analysis`, writ
 as JSON in full precision; or a regression of the grades, or estimates as a frame.
 """
 
-from masrel.lab.analysis._comparison import GateResult, check_gates
+from masrel.analysis._gates import GateResult
+from masrel.lab.analysis._comparison import check_gates
 from masrel.lab.analysis._grading import Effect, GradeRegression, grade_regression
 from masrel.lab.analysis._plan import analyze
 from masrel.lab.analysis._results import (

@@ -8,12 +8,12 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, p_value
+from masrel.analysis._gates import Gate, GateResult
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 from masrel.lab._study_files import (
@@ -24,7 +24,6 @@ from masrel.lab._study_files import (
     read_regular,
 )
 from masrel.lab.analysis._results import ANALYSIS_FORMAT, Analysis, PlannedEstimate
-from masrel.lab.protocol import Gate
 
 # inputs are compared by themselves; notes say in words what numbers beside them say
 _LEFT_OUT = ("format", "inputs", "masrel_version", "notes")
@@ -36,35 +35,6 @@ _ROUNDING = 1e-9  # of a number
 
 # Parts of a place that say nothing beside the name of a line of the plan
 _WITHIN = ("estimates", "estimate", "interval")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GateResult:
-    """What came of one gate.
-
-    Attributes
-    ----------
-    gate : Gate
-        The gate.
-    number : float
-        The number it is about; ``nan`` where it is undefined or not there.
-    holds : bool
-        Whether the number keeps the limit. One that is undefined never does.
-    reason : str or None
-        Why there is no number, or None.
-    """
-
-    gate: Gate
-    number: float
-    holds: bool
-    reason: str | None = None
-
-    def __str__(self) -> str:
-        gate = self.gate
-        verdict = "holds" if self.holds else "fails"
-        number = repr(self.number).removesuffix(".0")
-        why = f" ({gate.why})" if gate.why else ""
-        return f"{gate.where}: {gate}{why} {verdict}: {self.reason or number}"
 
 
 def check_gates(analysis: Analysis, gates: Iterable[Gate]) -> tuple[GateResult, ...]:
@@ -83,16 +53,9 @@ def check_gates(analysis: Analysis, gates: Iterable[Gate]) -> tuple[GateResult, 
         One per gate. A number that is undefined or not in the data fails.
     """
     planned = {each.line.id: each for each in analysis.estimates}
-    return tuple(_result(gate, planned[gate.estimate]) for gate in gates)
-
-
-def _result(gate: Gate, planned: PlannedEstimate) -> GateResult:
-    number, reason = _number(gate.number, planned)
-    if reason is None and not math.isfinite(number):
-        reason = "it is undefined"
-    if reason is not None:
-        return GateResult(gate=gate, number=math.nan, holds=False, reason=reason)
-    return GateResult(gate=gate, number=number, holds=gate.holds(number))
+    return tuple(
+        gate.hold(*_number(gate.number, planned[gate.estimate])) for gate in gates
+    )
 
 
 def _number(name: str, planned: PlannedEstimate) -> tuple[float, str | None]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._files import write_file
+from masrel.analysis._gates import Gate, GateResult
 from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
 from masrel.errors import ParameterError
@@ -23,8 +24,8 @@ from masrel.lab.report._report_folder import file_hash
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from masrel.lab.analysis import Analysis, GateResult, PlannedEstimate
-    from masrel.lab.protocol import Gate, Protocol
+    from masrel.lab.analysis import Analysis, PlannedEstimate
+    from masrel.lab.protocol import Protocol
 
 _LARGEST_SUMMARY = 1 << 20  # GitHub takes no more of a step
 
@@ -73,7 +74,7 @@ def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> dict[str, Any
     results = check_gates(analysis, gates)
     return {
         "holds": all(result.holds for result in results),
-        "gates": [*map(_as_document, results)],
+        "gates": [result.record() for result in results],
         "lines": [*map(str, results)],
         "junit": _junit_text(analysis, results),
         "summary": _job_summary(analysis, results),
@@ -160,18 +161,6 @@ def _absence(planned: "PlannedEstimate") -> str | None:
     if math.isnan(planned.estimate.value):
         return planned.estimate.reason
     return None
-
-
-def _as_document(result: "GateResult") -> dict[str, object]:
-    gate = result.gate
-    return {
-        "gate": str(gate),
-        "why": gate.why,
-        "where": gate.where,
-        "number": result.number if math.isfinite(result.number) else None,
-        "holds": result.holds,
-        "reason": result.reason,
-    }
 
 
 def _append(file: Path, text: str) -> None:

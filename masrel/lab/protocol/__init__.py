@@ -4,8 +4,8 @@ Goes in: ``protocol.toml``. Comes out: a :class:`Protocol`, and from it the scal
 the joint parameters of each model in SI units, and two hashes.
 """
 
+from masrel.analysis._gates import Gate
 from masrel.lab.protocol.content import (
-    Gate,
     gates_of,
     joint_model,
     parse_gate,

@@ -2,16 +2,13 @@
 
 import hashlib
 import math
-import operator
-import re
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, get_args
 
 import msgspec
 
-from masrel._input import listed
+from masrel.analysis._gates import Gate, read_gate
 from masrel.errors import ParameterError, ProtocolError
 from masrel.lab._study_files import once
 from masrel.lab.elbow.parameters import ElbowParameters
@@ -403,65 +400,7 @@ def _drop_repeated(model: dict[str, Any], elbow: dict[str, Any]) -> None:
 
 
 # Numbers of an estimate that a gate can be about
-_GATE_NUMBERS = ("value", "low", "high", "width", "n", "n_missing", "p")
-
-_COMPARISONS: dict[str, Callable[[float, float], bool]] = {
-    ">=": operator.ge,
-    "<=": operator.le,
-    ">": operator.gt,
-    "<": operator.lt,
-}
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-_PARTS = re.compile(r"\s*([^<>=\s]+)\s*(>=|<=|>|<)\s*([^<>=\s]+)\s*")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gate:
-    """A number of an analysis, and the limit that it must keep.
-
-    Attributes
-    ----------
-    estimate : str
-        Id of a line of the plan.
-    number : {"value", "low", "high", "width", "n", "n_missing", "p"}
-        Which number of it: the value, an end of its interval or the distance of both,
-        how many models it rests on, ratings that are missing, or the p-value of the
-        hypothesis that it is 0.
-    comparison : {">=", "<=", ">", "<"}
-        How it must compare with the limit.
-    limit : float
-        The limit.
-    why : str
-        For what reason.
-    where : str
-        Where the gate was set.
-    """
-
-    estimate: str
-    number: str
-    comparison: str
-    limit: float
-    why: str = ""
-    where: str = ""
-
-    def __str__(self) -> str:
-        limit = repr(self.limit).removesuffix(".0")
-        return f"{self.estimate}.{self.number} {self.comparison} {limit}"
-
-    def holds(self, number: float) -> bool:
-        """Return whether a number keeps the limit; ``nan`` never does.
-
-        Parameters
-        ----------
-        number : float
-            The number that the gate is about.
-
-        Returns
-        -------
-        bool
-            Whether it does.
-        """
-        return _COMPARISONS[self.comparison](number, self.limit)
+_NUMBERS = ("value", "low", "high", "width", "n", "n_missing", "p")
 
 
 def parse_gate(
@@ -496,34 +435,7 @@ def parse_gate(
     >>> str(parse_gate("kappa.low>=0.4", ["kappa"], where="--require"))
     'kappa.low >= 0.4'
     """
-    parts = _PARTS.fullmatch(text)
-    if parts is None:
-        raise ParameterError(
-            f"{where}: needed ESTIMATE.NUMBER, one of >=, <=, >, <, and a limit, such "
-            f"as kappa.low >= 0.4, got {text!r}"
-        )
-    name, comparison, limit = parts.groups()
-    estimate, _, number = name.rpartition(".")
-    if number not in _GATE_NUMBERS:
-        raise ParameterError(
-            f"{where}: needed one of {listed(_GATE_NUMBERS)} after the id of an "
-            f"estimate and a dot, got {name!r}"
-        )
-    if estimate not in estimates:
-        raise ParameterError(
-            f"{where}: needed an estimate of the plan "
-            f"({listed(estimates) or 'there is none'}), got {estimate!r}"
-        )
-    if not _NUMBER.fullmatch(limit) or not math.isfinite(float(limit)):
-        raise ParameterError(f"{where}: needed a number as limit, got {limit!r}")
-    return Gate(
-        estimate=estimate,
-        number=number,
-        comparison=comparison,
-        limit=float(limit),
-        why=why,
-        where=where,
-    )
+    return read_gate(text, dict.fromkeys(estimates, _NUMBERS), where=where, why=why)
 
 
 def gates_of(protocol: Protocol) -> tuple[Gate, ...]:
