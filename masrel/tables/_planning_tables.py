@@ -129,8 +129,9 @@ def planning_sentence(plan: Plan) -> str:
     width = (
         " reaches the aim"
         if math.isnan(plan.expected_half_width)
-        else f" has an expected half-width of {number(plan.expected_half_width, 3)} "
-        f"({number(plan.expected_low, 3)} to {number(plan.expected_high, 3)})"
+        else f" has an expected half-width of {number(plan.expected_half_width, 3)}"
+        + f" ({number(plan.expected_low, 3)} to {number(plan.expected_high, 3)})"
+        * (not math.isnan(plan.expected_low))
     )
     chances_of = [
         f"{word} {number(value, 3)}{of}"

@@ -53,7 +53,6 @@ from masrel.tables._tables import (
     Column,
     Table,
     Value,
-    counted,
     interval_text,
     number,
     percent,
@@ -367,12 +366,11 @@ def _category_rows(
             category_kappa(matrix.grades, grade, categories=grades).value
             for grade in grades
         ]
-    n_models = counted(len(entry.models), "model")
     keys = ("counts", "values", "low", "high")
     columns = [arrays[f"category_{key}"].tolist() for key in keys]
     for grade, n, value, *ends, kappa in zip(grades, *columns, kappas, strict=True):
         if n:
-            shown = few(ends, n_models) or interval_text(*ends)
+            shown = few(ends, model=len(entry.models)) or interval_text(*ends)
             yield grade, n, value, shown, *ends, kappa
         else:
             yield grade, n, *[None] * 5

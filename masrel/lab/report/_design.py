@@ -12,6 +12,7 @@ from masrel.lab.ratings import Rating
 from masrel.lab.report._material import (
     MANY_RATERS,
     Material,
+    estimate_titles,
     lacking,
     lines_of,
     macros,
@@ -256,8 +257,9 @@ def _by_rater(ratings: Sequence[Rating], key: str) -> str | None:
 
 
 _SIZES = (
-    Column(key="estimate", heading="Estimate", align="left"),
-    Column(key="what", heading="Planned or came", align="left"),
+    Column(key="title", heading="Estimate", align="left", where="page"),
+    Column(key="estimate", heading="Estimate", where="csv"),
+    Column(key="what", heading="Planned or obtained", align="left"),
     Column(key="n_items", heading="Items"),
     Column(key="n_raters", heading="Raters"),
     Column(key="value", heading="Value", digits=3),
@@ -270,22 +272,23 @@ _SIZES = (
 
 
 def sample_size_section(material: Material) -> Iterator[Content]:
-    """Show how the size was chosen, as the protocol says it, and what came of it."""
+    """Show how the size was chosen, as the protocol says it, and what was obtained."""
     sizes = material.protocol.analysis.sample_sizes
     if not sizes:
         yield lacking(sentence("sample-size", "nothing"))
         return
     of_line = {planned.line.id: planned for planned in material.analysis.estimates}
+    titles = estimate_titles([planned.line for planned in of_line.values()])
     rows: list[tuple[Value, ...]] = []
     for size in sizes:
         result = of_line[size.estimate]
         planned = size_sentence(material.protocol, size)
-        came = text_of("design.txt", "outcome", result, size, *_ends(result))
-        yield Paragraph(text=f"{result.line.id}: {planned} {came}")
-        rows += _size_rows(result, size)
+        obtained = text_of("design.txt", "outcome", result, size, *_ends(result))
+        yield Paragraph(text=f"{titles[size.estimate]}: {planned} {obtained}")
+        rows += _size_rows(titles[size.estimate], result, size)
     yield Table(
         name="sample_size",
-        caption="What was planned, and what came",
+        caption="Size of the study, as planned and as obtained",
         columns=_SIZES,
         rows=tuple(rows),
         notes=(sentence("sample-size", "planned"),),
@@ -345,14 +348,18 @@ def _ends(result: PlannedEstimate) -> _Ends:
     return 0.5 * (interval.high - interval.low), interval.low, interval.high
 
 
-def _size_rows(result: PlannedEstimate, size: SampleSize) -> list[tuple[Value, ...]]:
+def _size_rows(
+    title: str, result: PlannedEstimate, size: SampleSize
+) -> list[tuple[Value, ...]]:
     names = (
         *("n_items", "n_raters", "value", "expected_half_width"),
         *("expected_low", "expected_high", "assurance", "power"),
     )
-    value = None if result.estimate is None else result.estimate.value
-    came = (len(result.items) or None, len(result.raters) or None, value)
+    obtained = (
+        *(len(result.items) or None, len(result.raters) or None),
+        *(getattr(result.estimate, "value", None), *_ends(result), None, None),
+    )
     return [
-        (result.line.id, "planned", *(getattr(size, name) for name in names)),
-        (result.line.id, "came", *came, *_ends(result), None, None),
+        (title, result.line.id, "planned", *(getattr(size, name) for name in names)),
+        (title, result.line.id, "obtained", *obtained),
     ]

@@ -18,7 +18,6 @@ from masrel.lab.report._material import (
     FIGURES,
     INTERVAL,
     MANY_RATERS,
-    NOTHING,
     SUPPLEMENT,
     Material,
     few,
@@ -341,9 +340,9 @@ def confusion_section(material: Material) -> Iterator[Content]:
     grades, level = material.ratings.scale.grades, material.analysis.level
     caption = f"Grades given for each intended grade, session {session}"
     shares = _shares(by_rater, [grades.index(aim) for aim in intended], level)
-    n_raters = counted(by_rater.shape[1], "rater")
+    n_raters = by_rater.shape[1]
     drawn = shares.copy()
-    drawn[1:, shares[2] - shares[1] >= NOTHING] = np.nan
+    drawn[1:, [bool(few(ends, rater=n_raters)) for ends in shares[1:].T]] = np.nan
     counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
     framed = np.array([[grade == aim for grade in grades] for aim in intended])
     yield Paragraph(
@@ -381,12 +380,13 @@ def confusion_section(material: Material) -> Iterator[Content]:
         ),
         rows=tuple(
             (
-                *(aim, *of_aim, sum(of_aim), value),
-                few((low, high), n_raters, whole=100.0) or interval_text(low, high, 1),
-                *(low, high),
+                *(aim, *of_aim, sum(of_aim), 100.0 * value),
+                few((low, high), rater=n_raters)
+                or interval_text(100.0 * low, 100.0 * high, 1),
+                *(100.0 * low, 100.0 * high),
             )
             for aim, of_aim, (value, low, high) in zip(
-                intended, counts.tolist(), (100.0 * shares.T).tolist(), strict=True
+                intended, counts.tolist(), shares.T.tolist(), strict=True
             )
         ),
         notes=(

@@ -217,28 +217,34 @@ INTERVAL = (
 )
 """Columns of an interval: as shown, and its ends."""
 
-NOTHING = 0.9
-"""The width of an interval, of all that there is, from which on it says nothing."""
+_WIDE = 0.9  # of 0 to 1, from which on an interval tells nothing
+_FEW = 10  # units, below which it is wide for want of more of them
 
 
-def few(ends: Sequence[float], *counts: str, whole: float = 1.0) -> str:
-    """Return that an interval says nothing, being of so few; nothing if it does."""
-    are = "are" if counts[-1].endswith("s") else "is"
-    is_wide = ends[1] - ends[0] >= NOTHING * whole
-    return f"{joined(counts)} {are} too few" * is_wide
+def few(ends: Sequence[float], **counts: int) -> str:
+    """Return that units are too few for an interval; nothing if it is to be shown.
+
+    It tells nothing where it covers nearly all from 0, no agreement or that of chance,
+    to 1. Of ten or more units it does that only where grades hardly differ: then they
+    are not too few, and the interval is shown, wide as it is.
+    """
+    is_wide = min(ends[1], 1.0) - max(ends[0], 0.0) >= _WIDE
+    small = [counted(n, unit) for unit, n in counts.items() if n < _FEW and is_wide]
+    are = "are" if any(of.endswith("s") for of in small) else "is"
+    return f"{joined(small)} {are} too few" * bool(small)
 
 
 def too_few(estimate: Estimate) -> str:
-    """Return that the interval of an estimate says nothing; nothing if it does."""
+    """Return that an estimate has too few units for an interval; nothing if not."""
     interval = estimate.interval
     if interval is None or COEFFICIENTS[estimate.coefficient].in_units:
         return ""
     counts = {
-        "raters": counted(estimate.n_raters, "rater"),
-        "items": counted(estimate.n_items, "model"),
+        "rater": estimate.n_raters * (interval.target != "items"),
+        "model": estimate.n_items * (interval.target != "raters"),
     }
-    of = [text for name, text in counts.items() if interval.target in (name, "both")]
-    return few((interval.low, interval.high), *of)
+    ends = interval.low, interval.high
+    return few(ends, **{unit: n for unit, n in counts.items() if n})
 
 
 def at_ranks(values: Sequence[float]) -> dict[str, int]:

@@ -166,16 +166,23 @@ def test_intervals_made_alike_share_a_meaning_and_wide_ones_are_not_shown(
 ) -> None:
     other = interval(kind="credible", method="posterior", target="both", level=0.999)
     alike = (one(interval=interval()), one(interval=interval(low=0.1)))
-    wide = (interval(low=-0.2, target=target) for target in ("items", "raters", "both"))
-    lines = (*alike, one(interval=other), one(), *(one(interval=of) for of in wide))
+    wide = [interval(low=-0.2, target=target) for target in ("items", "raters", "both")]
+    # ten models are not few; the last is as wide, but far from full agreement
+    lines = (
+        *(*alike, one(interval=other), one()),
+        *(one(interval=of, n_items=n) for n in (4, 10) for of in wide),
+        one(interval=interval(low=-0.6, high=0.5)),
+    )
     (_, *rows), cells, text = shown(tmp_path, *lines)
-    assert [row[2] for row in rows[:7]] == [
+    assert [row[2] for row in rows[:11]] == [
         "[0.320, 0.933]", "[0.100, 0.933]", "[0.320, 0.933]", "–",
         "4 models are too few", "8 raters are too few",
         "8 raters and 4 models are too few",
+        "[−0.200, 0.933]", "8 raters are too few", "8 raters are too few",
+        "[−0.600, 0.500]",
     ]  # fmt: skip
     assert cells[4]["low"] == "-0.2"  # the file has it
-    assert "0.626 [-0.2" not in text.replace("−", "-")  # of the forest
+    assert text.count("0.626 [−0.2") == 1  # in the forest
     assert text.count("about 95 % of the intervals") == 3
     assert text.count("with probability 99.9 %") == 1
 

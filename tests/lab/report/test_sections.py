@@ -176,21 +176,21 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
         sized({}), table_v(),
         ["With 6 items and 8 raters, the 95 % interval of Fleiss' κ",
          "assurance 0.700 of a half-width up to 0.25, if the coefficient is",
-         "4 items and 8 raters came, with a half-width of 0.306",
-         "more than was wanted, 0.250.",
-         "| line | planned | 6 | 8 | 0.600 | 0.243 | – | – | 0.700 | – |",
-         "| line | came | 4 | 8 | 0.626 | 0.306 | 0.320 | 0.933 | – | – |"],
+         "The data have 4 items and 8 raters; the interval's half-width is 0.306",
+         "more than the 0.250 that was wanted.",
+         "models | planned | 6 | 8 | 0.600 | 0.243 | – | – | 0.700 | – |",
+         "models | obtained | 4 | 8 | 0.626 | 0.306 | 0.320 | 0.933 | – | – |"],
     ),
     "a size that was expected": (
-        sized(EXPECTED), table_v(), ["no more than was expected, 0.310."],
+        sized(EXPECTED), table_v(), ["no more than the 0.310 that was expected."],
     ),
     "a size without an interval": (
         sized({}, interval="none"), table_v(),
-        ["4 items and 8 raters came; there is no interval of"],
+        ["The data have 4 items and 8 raters, and there is no interval."],
     ),
     "a size of nothing": (
         sized({}, models="dummy"), table_v(),
-        ["Of this nothing came: no dummy model has ratings"],
+        ["There is no such estimate: no dummy model has ratings"],
     ),
     "no size": (
         study(sections=("sample-size",)), table_v(),
