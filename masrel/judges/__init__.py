@@ -4,4 +4,23 @@ In: grades of humans and of a judge, which may be a language model. Out: whether
 judge may stand for a human, rates corrected for its errors, and who is probably right.
 """
 
-__all__: list[str] = []
+from typing import TYPE_CHECKING
+
+from masrel._interpreter import loaded_from
+
+if TYPE_CHECKING:
+    from masrel.judges._paired import ScoreTest, score_test
+
+__all__ = [
+    "ScoreTest",
+    "score_test",
+]
+
+_HOMES = {
+    "ScoreTest": "_paired",
+    "score_test": "_paired",
+}
+
+
+# these load numpy and the coefficients
+__getattr__ = loaded_from(__name__, _HOMES)
