@@ -10,6 +10,14 @@ from masrel._interpreter import loaded_from
 
 if TYPE_CHECKING:
     from masrel.judges._paired import ScoreTest, score_test
+    from masrel.judges.latent_classes import (
+        DawidSkene,
+        DawidSkeneIntervals,
+        EffectiveNumber,
+        dawid_skene,
+        dawid_skene_intervals,
+        effective_number,
+    )
     from masrel.judges.rates import (
         RateEstimate,
         RateEstimates,
@@ -21,10 +29,16 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "DawidSkene",
+    "DawidSkeneIntervals",
+    "EffectiveNumber",
     "RateEstimate",
     "RateEstimates",
     "ScoreTest",
     "corrected_rate",
+    "dawid_skene",
+    "dawid_skene_intervals",
+    "effective_number",
     "label_allocation",
     "labels_needed",
     "prediction_powered_mean",
@@ -33,10 +47,16 @@ __all__ = [
 ]
 
 _HOMES = {
+    "DawidSkene": "latent_classes",
+    "DawidSkeneIntervals": "latent_classes",
+    "EffectiveNumber": "latent_classes",
     "RateEstimate": "rates",
     "RateEstimates": "rates",
     "ScoreTest": "_paired",
     "corrected_rate": "rates",
+    "dawid_skene": "latent_classes",
+    "dawid_skene_intervals": "latent_classes",
+    "effective_number": "latent_classes",
     "label_allocation": "rates",
     "labels_needed": "rates",
     "prediction_powered_mean": "rates",
