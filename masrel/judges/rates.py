@@ -31,7 +31,7 @@ _ASSUMPTIONS: dict[_RateMethod, _Assumption] = {
 }
 
 # Coverage below 93 % was met only with fewer: docs/judges_evidence.md
-_ENOUGH = {"labels": 10, "numbers": 50, "of_a_kind": 5}
+_ENOUGH = {"labels": 10, "numbers": 50, "of_both_kinds": 20, "of_a_kind": 5}
 
 _CORRECTED_OUTSIDE = (
     "the judge passes fewer items than its false passes alone would give: its errors "
@@ -659,7 +659,8 @@ def _corrected(
         value = (rate + q0 - 1.0) / (q0 + q1 - 1.0)
         ends = _lang_reiczigel(rate, n, sensitivity, specificity, _quantile(level))
         numbers = value, *ends
-    is_few = min(m1, m0) < _ENOUGH["of_a_kind"]
+    few, few_of_a_kind = _ENOUGH["of_both_kinds"], _ENOUGH["of_a_kind"]
+    is_few = m1 + m0 < few or min(m1, m0) < few_of_a_kind
     return _estimate(
         "rogan_gladen", numbers, level, (n, m1 + m0), is_few=is_few, reason=reason
     )
