@@ -117,7 +117,10 @@ def label_codes(
 ) -> tuple[Codes, tuple[Label, ...]]:
     """Return codes of rows of labels, and the scale: labels met unless declared."""
     # -> (n_items, n_raters); where: from row and column to the place, for messages
-    if not set(map(type, chain.from_iterable(rows))) <= _NEED_NO_CARE:
+    kinds = set(map(type, chain.from_iterable(rows)))
+    if kinds - _NEED_NO_CARE == {float}:  # of which nan alone is missing
+        rows = [[None if label != label else label for label in row] for row in rows]
+    elif not kinds <= _NEED_NO_CARE:
         rows = [
             [plain_label(label, where, i, j) for j, label in enumerate(row)]
             for i, row in enumerate(rows)

@@ -11,6 +11,7 @@ from masrel._input import check_option, shown
 from masrel.agreement._engine import (
     NO_SPREAD,
     ONE_PAIR,
+    Floats,
     check_level,
     undefined,
 )
@@ -240,6 +241,59 @@ def holm(p_values: Sequence[float]) -> list[float]:
     >>> holm([0.03, 0.01, 0.02])
     [0.04, 0.03, 0.04]
     """
+    adjusted = _checked_p_values(p_values)
+    known = np.flatnonzero(~np.isnan(adjusted))
+    ascending = known[np.argsort(adjusted[known])]
+    steps = adjusted[ascending] * np.arange(len(known), 0, -1)
+    adjusted[ascending] = np.maximum.accumulate(np.minimum(steps, 1.0))
+    return [float(p) for p in adjusted]
+
+
+def benjamini_yekutieli(p_values: Sequence[float]) -> list[float]:
+    """Return p-values adjusted for the share of false rejections among rejections.
+
+    Parameters
+    ----------
+    p_values : sequence of float, shape (n_tests,)
+        The p-values of the family; ``nan`` where a test is undefined, which then
+        counts for none of them.
+
+    Returns
+    -------
+    list of float, shape (n_tests,)
+        In the same order, ``nan`` where there was none: of the hypotheses of those at
+        most α, an expected share of at most α is true, however the tests depend on
+        each other.
+
+    Raises
+    ------
+    ParameterError
+        If a p-value is outside [0, 1].
+
+    References
+    ----------
+    .. [1] Benjamini, Y., Yekutieli, D. (2001). The control of the false discovery rate
+       in multiple testing under dependency. Annals of Statistics, 29(4), 1165-1188.
+       https://doi.org/10.1214/aos/1013699998, theorem 1.3
+
+    Examples
+    --------
+    With 1 + 1/2 + 1/3 for three tests: three times the least, 3/2 of the next, and
+    once the largest; none is larger than one after it:
+
+    >>> [round(p, 4) for p in benjamini_yekutieli([0.03, 0.01, 0.02])]
+    [0.055, 0.055, 0.055]
+    """
+    adjusted = _checked_p_values(p_values)
+    known = np.flatnonzero(~np.isnan(adjusted))
+    descending = known[np.argsort(-adjusted[known])]
+    ranks = np.arange(len(known), 0, -1)
+    steps = adjusted[descending] * len(known) * (1.0 / ranks).sum() / ranks
+    adjusted[descending] = np.minimum.accumulate(np.minimum(steps, 1.0))
+    return [float(p) for p in adjusted]
+
+
+def _checked_p_values(p_values: Sequence[float]) -> Floats:
     if not is_row(p_values):
         raise ParameterError(f"p_values: needs a sequence, got {shown(p_values)}")
     p_values = list(p_values)
@@ -249,12 +303,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
             raise ParameterError(
                 f"p_values: place {place}: needs [0, 1], got {shown(p)}"
             )
-    adjusted = np.array(p_values, dtype=float)
-    known = np.flatnonzero(~np.isnan(adjusted))
-    ascending = known[np.argsort(adjusted[known])]
-    steps = adjusted[ascending] * np.arange(len(known), 0, -1)
-    adjusted[ascending] = np.maximum.accumulate(np.minimum(steps, 1.0))
-    return [float(p) for p in adjusted]
+    return np.array(p_values, dtype=float)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,20 @@ from typing import TYPE_CHECKING
 from masrel._interpreter import loaded_from
 
 if TYPE_CHECKING:
-    from masrel.judges._paired import ScoreTest, score_test
+    from masrel.judges._paired import PairedTest, ScoreTest, score_test
+    from masrel.judges.annotators import (
+        EPSILONS,
+        AlternativeAnnotatorTest,
+        Grades,
+        HumanBesideJudge,
+        JudgeDifference,
+        Score,
+        ScoreName,
+        advantage,
+        advantage_differences,
+        alternative_annotator_test,
+        reference_difference,
+    )
     from masrel.judges.latent_classes import (
         DawidSkene,
         DawidSkeneIntervals,
@@ -29,12 +42,23 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "EPSILONS",
+    "AlternativeAnnotatorTest",
     "DawidSkene",
     "DawidSkeneIntervals",
     "EffectiveNumber",
+    "Grades",
+    "HumanBesideJudge",
+    "JudgeDifference",
+    "PairedTest",
     "RateEstimate",
     "RateEstimates",
+    "Score",
+    "ScoreName",
     "ScoreTest",
+    "advantage",
+    "advantage_differences",
+    "alternative_annotator_test",
     "corrected_rate",
     "dawid_skene",
     "dawid_skene_intervals",
@@ -43,16 +67,28 @@ __all__ = [
     "labels_needed",
     "prediction_powered_mean",
     "rate_estimates",
+    "reference_difference",
     "score_test",
 ]
 
 _HOMES = {
+    "EPSILONS": "annotators",
+    "AlternativeAnnotatorTest": "annotators",
     "DawidSkene": "latent_classes",
     "DawidSkeneIntervals": "latent_classes",
     "EffectiveNumber": "latent_classes",
+    "Grades": "annotators",
+    "HumanBesideJudge": "annotators",
+    "JudgeDifference": "annotators",
+    "PairedTest": "_paired",
     "RateEstimate": "rates",
     "RateEstimates": "rates",
+    "Score": "annotators",
+    "ScoreName": "annotators",
     "ScoreTest": "_paired",
+    "advantage": "annotators",
+    "advantage_differences": "annotators",
+    "alternative_annotator_test": "annotators",
     "corrected_rate": "rates",
     "dawid_skene": "latent_classes",
     "dawid_skene_intervals": "latent_classes",
@@ -61,6 +97,7 @@ _HOMES = {
     "labels_needed": "rates",
     "prediction_powered_mean": "rates",
     "rate_estimates": "rates",
+    "reference_difference": "annotators",
     "score_test": "_paired",
 }
 

@@ -26,6 +26,7 @@ _TIED = 1e-9  # statistics nearer than this are the same
 _PER_SD = 2.0  # places of the nuisance to a standard error of its estimate
 _PEAKS = 3  # highest maxima among these that are looked at more closely
 _CLOSER = np.linspace(-1.0, 1.0, 9)  # places around one of them
+_JOINED = 2.0  # items that differ in clusters wholly alike
 _SMALLEST = 1e-17  # probability of a count that adds nothing
 
 
@@ -172,7 +173,7 @@ def check_share(name: str, value: float, lowest: float = 0.0) -> None:
         raise ParameterError(f"{name}: needs [{lowest:g}, 1], got {shown(value)}")
 
 
-def tango(b: ArrayLike, c: ArrayLike, n: int, delta: float) -> Floats:
+def tango(b: ArrayLike, c: ArrayLike, n: float, delta: float) -> Floats:
     """Return Tango's z of counts, of any shape; ``nan`` for 0/0."""
     if delta < 0.0:
         return -tango(c, b, n, -delta)
@@ -237,6 +238,32 @@ _P_VALUES: dict[PairedTest, Callable[[int, int, int, float], float]] = {
     "score": _score_p,
     "t": _t_p,
 }
+
+
+def p_less_of_clusters(d: Integers, clusters: Integers, delta: float) -> float:
+    """Return the p-value of items that may be alike in a cluster, by Tango's score.
+
+    Counts are divided by their design effect [2]_, and z has Student's distribution
+    with as many degrees of freedom as clusters less 1. Few items that differ tell next
+    to nothing of how alike clusters are: two more, of clusters wholly alike, are
+    joined to them.
+    """
+    # d (n_items,): 1, -1 or 0; clusters (n_items,): codes
+    from scipy.special import stdtr
+
+    n, sizes = len(d), np.bincount(clusters)
+    sums, sizes = np.bincount(clusters, d)[sizes > 0], sizes[sizes > 0]
+    b, c, n_clusters = int((d == 1).sum()), int((d == -1).sum()), len(sizes)
+    if n_clusters < 2:
+        return math.nan
+    between = float(((sums - d.mean() * sizes) ** 2).sum())
+    between *= n_clusters / (n_clusters - 1)
+    by_item = b + c - (b - c) ** 2 / n
+    effect = max(between / by_item, 1.0) if by_item > 0.0 else 1.0
+    weight = _JOINED / (_JOINED + b + c)
+    effect += weight * (float((sizes**2).sum()) / n - effect)
+    z = tango(b / effect, c / effect, n / effect, delta)
+    return float(stdtr(n_clusters - 1, z))
 
 
 def lower_region(z: float, n: int, delta: float) -> Integers:

@@ -1,0 +1,944 @@
+"""The alternative annotator test: whether a judge may stand for a human.
+
+In: grades of humans and of a judge, by item. Out: how often the judge is at least as
+near to the other humans as each of them is, tests of that, and intervals.
+"""
+
+import math
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import combinations
+from typing import Any, Literal, Protocol, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel._input import check_option, listed, refuse, shown
+from masrel.agreement import (
+    Label,
+    Weights,
+    WeightsLike,
+    benjamini_yekutieli,
+    declared_weights,
+    holm,
+)
+from masrel.agreement._engine import NO_SPREAD, Floats, Integers, check_level, undefined
+from masrel.agreement._labels import check_categories, is_missing, label_codes
+from masrel.errors import ParameterError, RatingsError
+from masrel.estimates import Estimate, Interval, Target, Unit
+from masrel.intervals._question import student_t, warn_small
+from masrel.judges._paired import (
+    NO_CHANGE,
+    PairedTest,
+    ScoreTest,
+    check_share,
+    p_less,
+    p_less_of_clusters,
+    score_test,
+)
+
+EPSILONS: Mapping[str, float] = {"expert": 0.2, "skilled": 0.15, "crowd": 0.1}
+"""How much less often a human may win than the judge loses, by who the humans are."""
+
+
+class Grades(Protocol):
+    """Grades by item: a dict, a pandas Series, or another thing that has `items`."""
+
+    def items(self) -> Collection[tuple[Any, Any]]:
+        """Return pairs of item and grade."""
+        ...
+
+
+ScoreName = Literal["accuracy", "neg_rmse"]
+"""How near a grade is to those of others: how many are equal, or -√(mean square)."""
+
+Score = ScoreName | tuple[WeightsLike, Sequence[Label]]
+"""A name, or weights of agreement and the declared categories that they are of."""
+
+_Clusters = Mapping[Hashable, Hashable] | None
+_Bools = NDArray[np.bool_]
+
+_EXACT_UP_TO = 2500  # items, of which an exact p-value takes some 50 ms
+_FEW_CLUSTERS = 20
+_ROUNDING = 1e-12  # share of a sum of weights, or an error, that is none
+_NO_ITEM = "without one of what is left out a human has no item"
+_AT_THE_END = "it is at the end of its scale, where nothing shows what others would be"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HumanBesideJudge:
+    """One human and the judge, each held against the other humans.
+
+    Attributes
+    ----------
+    name : str
+        The human.
+    n_items : int
+        Items that the human graded, of those that count.
+    b, c : int
+        Items where the human is nearer to the others than the judge is, and items
+        where the judge is nearer.
+    judge_share, human_share : float
+        How often the judge is at least as near as the human, 1 - b/n, and the human at
+        least as near as the judge, 1 - c/n.
+    test : {"exact", "score", "t", "clusters"}
+        How it was tested.
+    p_value : float
+        Of the hypothesis that the human's share exceeds the judge's by at least
+        epsilon; ``nan`` when undefined, which is no rejection.
+    p_adjusted : float
+        The same by Benjamini and Yekutieli's method for all humans.
+    is_rejected : bool
+        Whether it is rejected: the judge is no worse than the human by epsilon.
+    reason : str or None
+        Why the p-value is undefined, or None.
+    """
+
+    name: str
+    n_items: int
+    b: int
+    c: int
+    judge_share: float
+    human_share: float
+    test: Literal["exact", "score", "t", "clusters"]
+    p_value: float
+    p_adjusted: float
+    is_rejected: bool
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlternativeAnnotatorTest:
+    """Whether a judge may stand for one of the humans.
+
+    Attributes
+    ----------
+    winning_rate : float
+        Share of the humans whose hypothesis is rejected, ω.
+    advantage : float
+        Mean of the judge's shares, ρ: how often it is at least as near to the other
+        humans as a human is. `advantage` has its interval.
+    is_passed : bool
+        Whether the winning rate is at least one half.
+    humans : tuple of HumanBesideJudge
+        Each human that was tested, in the order of the data.
+    left_out : tuple of (str, int)
+        Humans with fewer items than `min_items`, and how many; the others are held
+        against them, too.
+    n_items : int
+        Items that count: with grades of at least two humans, and of the judge.
+    n_clusters : int or None
+        Clusters of these; None without.
+    epsilon : float
+        By how much a human's share may exceed the judge's.
+    score : str
+        How grades were compared: the name of the score, or of the weights.
+    test : {"auto", "exact", "score", "t"}
+        What was asked for.
+    level : float
+        Bound of the expected share of false rejections.
+    thresholds : tuple of float
+        What the smallest p-value, the next, … are held against.
+    min_items : int
+        Items from which on a human is tested.
+    """
+
+    winning_rate: float
+    advantage: float
+    is_passed: bool
+    humans: tuple[HumanBesideJudge, ...]
+    left_out: tuple[tuple[str, int], ...]
+    n_items: int
+    n_clusters: int | None
+    epsilon: float
+    score: str
+    test: str
+    level: float
+    thresholds: tuple[float, ...]
+    min_items: int
+
+
+def alternative_annotator_test(
+    humans: Mapping[str, Grades],
+    judge: Grades,
+    *,
+    epsilon: float,
+    score: Score = "accuracy",
+    test: PairedTest | Literal["auto"] = "auto",
+    min_items: int = 30,
+    level: float = 0.05,
+    clusters: _Clusters = None,
+) -> AlternativeAnnotatorTest:
+    """Test whether a judge may stand for a human, each human held against the others.
+
+    Parameters
+    ----------
+    humans : mapping of mappings, or DataFrame
+        The grades of each human by item, as ``{human: {item: grade}}`` or a column
+        each; None and ``nan`` are missing.
+    judge : mapping or Series
+        The grade of the judge by item.
+    epsilon : float
+        By how much a human may be better and the judge still pass, within [0, 1];
+        `EPSILONS` has what the authors advise.
+    score : {"accuracy", "neg_rmse"} or tuple, optional
+        How near a grade is to the others' grades: how many of them are equal, or minus
+        the root of the mean square difference. Or weights of agreement, a name or a
+        matrix, with the declared categories: ``("linear", ["low", "mid", "high"])``.
+    test : {"auto", "exact", "score", "t"}, optional
+        Exact and unconditional, Tango's score test, or Student's t as in the paper;
+        by default exact up to 2500 items of a human, and by the score above.
+    min_items : int, optional
+        Items that a human needs to be tested. The exact test keeps its level however
+        few there are, but then it has little power.
+    level : float, optional
+        Expected share of false rejections, by Benjamini and Yekutieli's method.
+    clusters : mapping or Series, optional
+        The cluster of every item, such as the document it is from. The test is then
+        Tango's with a design effect, and is for `test` "auto" alone.
+
+    Returns
+    -------
+    AlternativeAnnotatorTest
+        The winning rate, the advantage, and each human's line.
+
+    Raises
+    ------
+    ParameterError
+        If an option is unknown or outside its range.
+    RatingsError
+        If grades do not fit the score, an item is there twice or has no cluster, or
+        no human has enough items.
+
+    Warns
+    -----
+    SmallSampleWarning
+        Below 20 clusters.
+    UndefinedStatisticWarning
+        If the p-value of a human is 0/0.
+
+    Notes
+    -----
+    Items count that at least two humans and the judge have graded. Ties are exact:
+    scores are compared as whole numbers, grades with a point as the decimals they are
+    written as; sums of weights that differ by rounding alone are equal.
+
+    The paper's t-test rejects too often where human and judge seldom differ, 11.5 % at
+    a nominal 5 % in a case of 30 items, and has p = 0 where they never do. The exact
+    p-value is the largest that any share of ties allows, outcomes in the order of
+    Tango's statistic. With clusters the counts are divided by their design effect,
+    which is drawn towards that of items wholly alike in a cluster, as if two more
+    items had differed and said so; Student's t with as many degrees of freedom as
+    clusters less 1 takes the place of the normal.
+
+    References
+    ----------
+    .. [1] Calderon, N., Reichart, R., Dror, R. (2025). The alternative annotator test
+       for LLM-as-a-judge: how to statistically justify replacing human annotators with
+       LLMs. ACL 2025, 16051-16081. https://arxiv.org/abs/2501.10970
+    .. [2] Hsueh, H.-M., Liu, J.-P., Chen, J. J. (2001). Unconditional exact tests for
+       equivalence or noninferiority for paired binary endpoints. Biometrics, 57(2),
+       478-483. https://doi.org/10.1111/j.0006-341X.2001.00478.x
+    .. [3] Benjamini, Y., Yekutieli, D. (2001). The control of the false discovery rate
+       in multiple testing under dependency. Annals of Statistics, 29(4), 1165-1188.
+       https://doi.org/10.1214/aos/1013699998
+
+    Examples
+    --------
+    >>> grades = ["a", "b", "b", "a", "b"] * 20
+    >>> humans = {
+    ...     "Ann": dict(enumerate(grades)),
+    ...     "Ben": dict(enumerate(["b"] + grades[1:])),
+    ...     "Cem": dict(enumerate(grades[:-1] + ["a"])),
+    ... }
+    >>> result = alternative_annotator_test(
+    ...     humans, dict(enumerate(grades)), epsilon=0.1
+    ... )
+    >>> result.winning_rate, result.advantage
+    (1.0, 1.0)
+    >>> result.humans[1].c, round(result.humans[1].p_value, 6)
+    (1, 0.00025)
+    """
+    check_share("epsilon", epsilon)
+    check_option("test", test, ("auto", *get_args(PairedTest)))
+    check_level(level)
+    refuse(
+        (
+            clusters is not None and test != "auto",
+            f'test: with clusters it needs "auto", got {shown(test)}',
+        )
+    )
+    graded = _graded(humans, {"judge": judge}, score, min_items)
+    units = None if clusters is None else graded.cluster_codes(clusters)
+    nearer, n_items = graded.nearer()[0], graded.rated.sum(axis=0).tolist()
+    rows = []
+    for j in np.flatnonzero(graded.is_tested):
+        rated = graded.rated[:, j]
+        of = None if units is None else units[rated]
+        rows.append(_human(graded.names[j], nearer[rated, j], epsilon, test, of))
+    m = len(rows)
+    # what is undefined rejects nothing, and is of one of the humans all the same
+    known = [1.0 if row["reason"] else row["p_value"] for row in rows]
+    lines = tuple(
+        HumanBesideJudge(**row, p_adjusted=p, is_rejected=p <= level)
+        for row, p in zip(rows, benjamini_yekutieli(known), strict=True)
+    )
+    n_clusters = None if units is None else int(units.max()) + 1
+    warn_small(n_clusters or _FEW_CLUSTERS, _FEW_CLUSTERS, "clusters")
+    winning_rate = sum(line.is_rejected for line in lines) / m
+    harmonic = sum(1.0 / k for k in range(1, m + 1))
+    return AlternativeAnnotatorTest(
+        winning_rate=winning_rate,
+        advantage=sum(line.judge_share for line in lines) / m,
+        is_passed=winning_rate >= 0.5,
+        humans=lines,
+        left_out=tuple(
+            (graded.names[j], n_items[j]) for j in np.flatnonzero(~graded.is_tested)
+        ),
+        n_items=len(graded.items),
+        n_clusters=n_clusters,
+        epsilon=float(epsilon),
+        score=graded.score,
+        test=test,
+        level=level,
+        thresholds=tuple(k * level / (m * harmonic) for k in range(1, m + 1)),
+        min_items=min_items,
+    )
+
+
+def _human(
+    name: str, nearer: Integers, epsilon: float, test: str, units: Integers | None
+) -> dict[str, Any]:
+    """Return the line of one human, before the others are regarded."""
+    # nearer (n_items,): 1 where the human is, -1 where the judge is
+    n, b, c = len(nearer), int((nearer == 1).sum()), int((nearer == -1).sum())
+    way: Any = test
+    if units is not None:
+        way, p = "clusters", p_less_of_clusters(nearer, units, epsilon)
+    else:
+        if test == "auto":
+            way = "exact" if n <= _EXACT_UP_TO else "score"
+        p = p_less(b, c, n, epsilon, way)
+    reason = undefined(f"the p-value of {name}", NO_CHANGE) if math.isnan(p) else None
+    return {
+        "name": name,
+        "n_items": n,
+        "b": b,
+        "c": c,
+        "judge_share": 1.0 - b / n,
+        "human_share": 1.0 - c / n,
+        "test": way,
+        "p_value": p,
+        "reason": reason,
+    }
+
+
+# -- who is nearer to the others -------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Graded:
+    """Grades of the items that count, as values whose nearness is a number."""
+
+    names: list[str]  # of the humans
+    items: list[Hashable]
+    humans: NDArray[Any]  # (n_items, n_humans)
+    rated: _Bools  # whether there is such a grade, (n_items, n_humans)
+    judges: NDArray[Any]  # (n_items, n_judges)
+    nearness: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]]
+    is_tested: _Bools  # whether a human has enough items, (n_humans,)
+    n_categories: int
+    score: str
+
+    def nearer(self) -> Integers:
+        """Return 1 where a human is nearer to the others, -1 where a judge is."""
+        # -> (n_judges, n_items, n_humans); whole numbers are exact, of any size
+        n_humans = len(self.names)
+        of_humans: Any = 0
+        of_judges = []
+        for k in range(n_humans):
+            grade, is_there = self.humans[:, k, None], self.rated[:, k, None]
+            to_k = self.nearness(self.humans, grade) * is_there
+            to_k[:, k] = 0  # nobody is held against himself
+            of_humans = of_humans + to_k
+            of_judges.append(self.nearness(self.judges, grade) * is_there)
+        by_human = np.stack(of_judges, axis=-1)  # (n_items, n_judges, n_humans)
+        of_judge = by_human.sum(axis=-1, keepdims=True) - by_human
+        gap = np.moveaxis(of_humans[:, None, :] - of_judge, 1, 0)
+        rounding = _ROUNDING * np.abs(of_judge).max() if gap.dtype.kind == "f" else 0
+        signs = (gap > rounding).astype(np.int8) - (gap < -rounding).astype(np.int8)
+        return np.asarray(signs * self.rated)
+
+    def without(self, j: int) -> "_Graded":
+        """Return the same without one human, whom nobody is held against then."""
+        rated = np.delete(self.rated, j, axis=1)
+        return replace(
+            self,
+            names=self.names[:j] + self.names[j + 1 :],
+            humans=np.delete(self.humans, j, axis=1),
+            rated=rated & (rated.sum(axis=1, keepdims=True) >= 2),
+            is_tested=np.delete(self.is_tested, j),
+        )
+
+    def cluster_codes(self, clusters: _Clusters) -> Integers:
+        """Return the cluster of every item as numbers from 0; without any, the item."""
+        # -> (n_items,)
+        if clusters is None:
+            return np.arange(len(self.items))
+        of = _by_item(clusters, "clusters")
+        labels = [of.get(item) for item in self.items]
+        for item, label in zip(self.items, labels, strict=True):
+            if is_missing(label):
+                raise RatingsError(f"clusters: item {item!r} needs one, got nothing")
+        codes = {label: code for code, label in enumerate(dict.fromkeys(labels))}
+        return np.array([codes[label] for label in labels])
+
+
+def _graded(
+    humans: Mapping[str, Grades],
+    judges: Mapping[str, Grades],
+    score: Score,
+    min_items: int,
+) -> _Graded:
+    """Check grades; code those of items with two humans' and all judges' grades."""
+    if not (isinstance(min_items, int | np.integer) and min_items >= 1):
+        raise ParameterError(
+            f"min_items: needs a whole number of at least 1, got {shown(min_items)}"
+        )
+    title, declared, weights = _checked_score(score)
+    by_human = {
+        str(name): _by_item(grades, f"humans: {name}")
+        for name, grades in _by_item(humans, "humans").items()
+    }
+    by_judge = [_by_item(grades, name) for name, grades in judges.items()]
+    n, graders = len(by_human), [*by_human.values(), *by_judge]
+    items = [item for item in by_judge[0] if all(item in of for of in by_judge)]
+    places = [*(f"humans: {name}" for name in by_human), *judges]
+    codes, categories = label_codes(
+        [list(map(of.get, items)) or [None] for of in graders],
+        declared,
+        lambda row, column: f"{places[row]}: item {items[column]!r}",
+    )
+    codes = np.ascontiguousarray(codes.T)  # (n_items, n_graders)
+    is_there = codes >= 0
+    does_count = is_there[:, n:].all(axis=1) & (is_there[:, :n].sum(axis=1) >= 2)
+    if not does_count.any():
+        raise RatingsError(
+            f"{listed(judges)}: needs items that two humans have graded, too; none of "
+            f"{len(items)} is, such as {shown(next(iter(by_judge[0]), None))}"
+        )
+    rated = is_there[does_count, :n]
+    values, nearness = _values(title, codes[does_count], categories, weights)
+    return _Graded(
+        names=list(by_human),
+        items=[items[row] for row in np.flatnonzero(does_count)],
+        humans=values[:, :n],
+        rated=rated,
+        judges=values[:, n:],
+        nearness=nearness,
+        is_tested=_enough(list(by_human), rated.sum(axis=0), min_items),
+        n_categories=len(categories),
+        score=title,
+    )
+
+
+def _by_item(grades: Any, place: str) -> dict[Any, Any]:
+    """Return what there is by item, once each."""
+    pairs = list(grades.items()) if hasattr(grades, "items") else None
+    if pairs is None:
+        raise RatingsError(
+            f"{place}: needs a dict, a Series or a DataFrame, got {shown(grades)}"
+        )
+    by_item = dict(pairs)
+    if len(by_item) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for i, name in enumerate(names) if name in names[:i])
+        raise RatingsError(f"{place}: needs each name once, got {twice!r} twice")
+    return by_item
+
+
+def _enough(names: Sequence[str], n_items: Integers, min_items: int) -> _Bools:
+    """Return whether humans have enough items; one has."""
+    if not (n_items >= min_items).any():
+        each = zip(names, n_items.tolist(), strict=True)
+        raise RatingsError(
+            f"min_items: needs a human with at least {min_items} items that another "
+            "human and the judge have graded, got "
+            + listed(f"{name} with {n}" for name, n in each)
+        )
+    return np.asarray(n_items >= min_items)
+
+
+def _checked_score(
+    score: Score,
+) -> tuple[str, tuple[Label, ...] | None, Weights | None]:
+    """Return the name of a score, and the categories and weights that it declares."""
+    if isinstance(score, tuple) and len(score) == 2:
+        weights, categories = score
+        declared = check_categories(categories)
+        made = declared_weights(weights, declared)
+        refuse((made.reason is not None, f"score: {made.reason}"))
+        return made.name, declared, made
+    check_option("score", score, get_args(ScoreName))
+    return str(score), None, None
+
+
+def _values(
+    score: str, codes: Integers, categories: Sequence[Label], weights: Weights | None
+) -> tuple[NDArray[Any], Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]]]:
+    """Return values of grades, and how near two of them are."""
+    if weights is not None:
+        return codes, lambda a, b: -weights.v[a, b]
+    if score == "accuracy":
+        return codes, lambda a, b: np.equal(a, b).astype(np.int64)
+    # of equally many others a larger mean square is a larger sum of squares
+    whole = _whole_numbers(categories, codes.shape[1])
+    return whole[codes], lambda a, b: -((a - b) ** 2)
+
+
+def _whole_numbers(categories: Sequence[Label], n_graders: int) -> NDArray[Any]:
+    """Return grades as whole numbers, in the proportions of the decimals they are."""
+    others = [x for x in categories if not isinstance(x, int)]
+    if not all(isinstance(x, float) and math.isfinite(x) for x in others):
+        raise RatingsError(
+            "score: neg_rmse needs grades that are finite numbers, got "
+            + listed(map(repr, categories))
+        )
+    exact = [Fraction(x if isinstance(x, int) else str(x)) for x in categories]
+    scale = math.lcm(*(x.denominator for x in exact))
+    whole = [int((x - min(exact)) * scale) for x in exact]
+    fits = max(whole) ** 2 * n_graders < 2**62
+    return np.array(whole, dtype=np.int64 if fits else object)
+
+
+# -- how sure the advantage is ---------------------------------------------------------
+
+
+def advantage(
+    humans: Mapping[str, Grades],
+    judge: Grades,
+    *,
+    target: Target,
+    score: Score = "accuracy",
+    min_items: int = 30,
+    level: float = 0.95,
+    clusters: _Clusters = None,
+) -> Estimate:
+    """Estimate how often a judge is at least as near to humans as one of them is.
+
+    Parameters
+    ----------
+    humans : mapping of mappings, or DataFrame
+        The grades of each human by item; see `alternative_annotator_test`.
+    judge : mapping or Series
+        The grade of the judge by item.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew: items, humans, or both.
+    score : {"accuracy", "neg_rmse"} or tuple, optional
+        How near grades are; see `alternative_annotator_test`.
+    min_items : int, optional
+        Items that a human needs to be one of the mean.
+    level : float, optional
+        Nominal level of the interval.
+    clusters : mapping or Series, optional
+        The cluster of every item, which leaves as a whole.
+
+    Returns
+    -------
+    Estimate
+        The mean over humans of the judge's shares, ρ, with its interval: by the
+        jackknife and Student's t, on the logit scale so that it stays inside [0, 1];
+        exact where all items are alike.
+
+    Raises
+    ------
+    ParameterError
+        If an option is outside its range, or other humans are the target and there
+        are fewer than 3.
+    RatingsError
+        If grades do not fit; see `alternative_annotator_test`.
+
+    Warns
+    -----
+    SmallSampleWarning
+        Below 10 items or clusters, or 5 humans, of those that are left out.
+    UndefinedStatisticWarning
+        If leaving one out never changes the estimate or leaves a human without items,
+        or other humans are a target and the judge is never farther than a human, or
+        always.
+
+    Notes
+    -----
+    A human who is left out is not held against the judge, and nobody is held against
+    this human. For "both" the variances are added; the degrees of freedom are the
+    fewer of those of items, of the human who has the fewest, and of humans.
+
+    References
+    ----------
+    .. [1] Calderon, N., Reichart, R., Dror, R. (2025); see
+       `alternative_annotator_test`.
+    .. [2] Efron, B., Stein, C. (1981). The jackknife estimate of variance. Annals of
+       Statistics, 9(3), 586-596. https://doi.org/10.1214/aos/1176345462
+
+    Examples
+    --------
+    >>> grades = ["a", "b", "b", "a", "b"] * 12
+    >>> humans = {
+    ...     "Ann": dict(enumerate(grades)),
+    ...     "Ben": dict(enumerate(["b"] + grades[1:])),
+    ...     "Cem": dict(enumerate(grades[:-1] + ["a"])),
+    ... }
+    >>> judge = dict(enumerate(["b", "a", "a"] + grades[3:]))
+    >>> estimate = advantage(humans, judge, target="items")
+    >>> round(estimate.value, 3), round(estimate.interval.low, 3)
+    (0.967, 0.872)
+    """
+    of = {"judge": judge}
+    rest = _leave_out(humans, of, target, score, min_items, level, clusters)
+    graded, value, interval = rest.graded, float(rest.values[0]), rest.interval
+    error = math.nan
+    if 0.0 < value < 1.0:
+        error, reason = rest.error(np.ones(1))
+        # symmetric on the logit, by whose slope the error is multiplied
+        half = student_t(level, rest.df) * error / (value * (1.0 - value))
+        odds = value / (1.0 - value)
+        low, high = (1.0 / (1.0 + math.exp(-x) / odds) for x in (-half, half))
+        method = f"{interval.method} on the logit"
+        interval = replace(interval, low=low, high=high, method=method, reason=reason)
+    elif target == "items":
+        # of n units none was otherwise: Clopper and Pearson's interval
+        share = (0.5 - 0.5 * level) ** (1.0 / (rest.df + 1.0))
+        low, high = (share, 1.0) if value else (0.0, 1.0 - share)
+        method = f"exact, all {interval.unit} being alike"
+        interval = replace(interval, low=low, high=high, method=method)
+    else:
+        undefined("the interval of the advantage", _AT_THE_END)
+        interval = replace(interval, reason=_AT_THE_END)
+    return Estimate(
+        coefficient="advantage",
+        weights=graded.score,
+        value=value,
+        standard_error=error,
+        interval=interval,
+        observed=value,
+        chance=math.nan,
+        n_items=len(graded.items),
+        n_items_paired=len(graded.items),
+        n_raters=int(graded.is_tested.sum()),
+        n_categories=graded.n_categories,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgeDifference:
+    """How much the advantage of one judge exceeds that of another on the same items.
+
+    Attributes
+    ----------
+    first, second : str
+        The judges.
+    value : float
+        Advantage of the first less that of the second.
+    standard_error : float
+        By the jackknife; ``nan`` when undefined.
+    interval : Interval
+        Of this difference alone.
+    p_value, p_holm : float
+        Two-sided, that there is no difference; and adjusted for all pairs.
+    n_items : int
+        Items that two humans and all judges have graded.
+    """
+
+    first: str
+    second: str
+    value: float
+    standard_error: float
+    interval: Interval
+    p_value: float
+    p_holm: float
+    n_items: int
+
+
+def advantage_differences(
+    humans: Mapping[str, Grades],
+    judges: Mapping[str, Grades],
+    *,
+    target: Target,
+    score: Score = "accuracy",
+    min_items: int = 30,
+    level: float = 0.95,
+    clusters: _Clusters = None,
+) -> tuple[JudgeDifference, ...]:
+    """Compare the advantages of several judges on the items that all have graded.
+
+    Parameters
+    ----------
+    humans : mapping of mappings, or DataFrame
+        The grades of each human by item; see `alternative_annotator_test`.
+    judges : mapping of mappings, or DataFrame
+        The grades of each judge by item; two judges or more.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew: items, humans, or both.
+    score : {"accuracy", "neg_rmse"} or tuple, optional
+        How near grades are; see `alternative_annotator_test`.
+    min_items : int, optional
+        Items that a human needs to be one of the mean.
+    level : float, optional
+        Nominal level of each interval.
+    clusters : mapping or Series, optional
+        The cluster of every item, which leaves as a whole.
+
+    Returns
+    -------
+    tuple of JudgeDifference
+        Every two judges, in the order given.
+
+    Raises
+    ------
+    ParameterError
+        If an option is outside its range, there are fewer than two judges, or other
+        humans are the target and there are fewer than 3.
+    RatingsError
+        If grades do not fit; see `alternative_annotator_test`.
+
+    Warns
+    -----
+    SmallSampleWarning
+        Below 10 items or clusters, or 5 humans, of those that are left out.
+    UndefinedStatisticWarning
+        If leaving one out never changes a difference.
+
+    Notes
+    -----
+    Each item leaves for all judges at once, which keeps what they have in common;
+    Student's t has the degrees of freedom of `advantage`.
+
+    References
+    ----------
+    .. [1] Calderon, N., Reichart, R., Dror, R. (2025); see
+       `alternative_annotator_test`.
+    .. [2] Holm, S. (1979); see `masrel.agreement.holm`.
+
+    Examples
+    --------
+    >>> grades = ["a", "b", "b", "a", "b"] * 12
+    >>> humans = {
+    ...     "Ann": dict(enumerate(grades)),
+    ...     "Ben": dict(enumerate(["b"] + grades[1:])),
+    ...     "Cem": dict(enumerate(grades[:-1] + ["a"])),
+    ... }
+    >>> judges = {
+    ...     "one": dict(enumerate(grades)),
+    ...     "other": dict(enumerate(["b", "a", "a", "b", "a"] + grades[5:])),
+    ... }
+    >>> (pair,) = advantage_differences(humans, judges, target="items")
+    >>> round(pair.value, 3), round(pair.interval.low, 3)
+    (0.067, 0.002)
+    """
+    by_name = {str(name): grades for name, grades in _by_item(judges, "judges").items()}
+    if len(by_name) < 2:
+        raise ParameterError(f"judges: needs at least two, got {len(by_name)}")
+    rest = _leave_out(humans, by_name, target, score, min_items, level, clusters)
+    names, contrasts = list(by_name), np.eye(len(by_name))
+    pairs = list(combinations(range(len(names)), 2))
+    rows = [_difference(rest, contrasts[i] - contrasts[j]) for i, j in pairs]
+    adjusted = holm([row["p_value"] for row in rows])
+    return tuple(
+        JudgeDifference(first=names[i], second=names[j], **row, p_holm=p)
+        for (i, j), row, p in zip(pairs, rows, adjusted, strict=True)
+    )
+
+
+def _difference(rest: "_LeftOut", contrast: Floats) -> dict[str, Any]:
+    """Return what is to be said of two judges, before other pairs are regarded."""
+    from scipy.special import stdtr  # loaded only for a p-value
+
+    value, (error, reason) = float(contrast @ rest.values), rest.error(contrast)
+    half = student_t(rest.interval.level, rest.df) * error
+    low, high = max(value - half, -1.0), min(value + half, 1.0)
+    if reason is not None:
+        low = high = math.nan
+    return {
+        "value": value,
+        "standard_error": error,
+        "interval": replace(rest.interval, low=low, high=high, reason=reason),
+        "p_value": 2.0 * float(stdtr(rest.df, -abs(value / error))),
+        "n_items": len(rest.graded.items),
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _LeftOut:
+    """Advantages of judges, and how they move together when units are left out."""
+
+    graded: _Graded
+    values: Floats  # (n_judges,)
+    moved: list[Floats]  # without each unit of a kind, (n_judges, n_units)
+    df: float
+    interval: Interval  # without ends
+
+    def error(self, contrast: Floats) -> tuple[float, str | None]:
+        """Return the standard error of a contrast of judges; or why there is none."""
+        variance = 0.0
+        for moved in self.moved:  # (n - 1)/n Σ (θ_i - mean)² [2]_, of each kind
+            without = contrast @ moved
+            n = len(without)
+            variance += (n - 1) / n * float(((without - without.mean()) ** 2).sum())
+        reason = _NO_ITEM if math.isnan(variance) else NO_SPREAD
+        if math.sqrt(variance) > _ROUNDING:
+            return math.sqrt(variance), None
+        return math.nan, undefined("the interval of the advantage", reason)
+
+
+def _leave_out(
+    humans: Mapping[str, Grades],
+    judges: Mapping[str, Grades],
+    target: Target,
+    score: Score,
+    min_items: int,
+    level: float,
+    clusters: _Clusters,
+) -> _LeftOut:
+    """Check a question about advantages, and leave out what it asks of."""
+    check_option("target", target, get_args(Target))
+    check_level(level)
+    graded = _graded(humans, judges, score, min_items)
+    unit: Unit = "items" if clusters is None else "clusters"
+    lost, df, notes = graded.nearer() == 1, math.inf, list[str]()
+    moved = []
+    if target != "raters":
+        without, n_units = _without_units(lost, graded, graded.cluster_codes(clusters))
+        moved, df = [without], n_units - 1.0
+        notes += warn_small(n_units, 10, unit)
+    if target != "items":
+        without = _without_humans(graded, target)
+        moved, df = [*moved, without], min(df, without.shape[1] - 1.0)
+        notes += warn_small(without.shape[1], 5, "humans")
+    words = {"items": unit, "raters": "humans", "both": f"{unit} and humans"}
+    interval = Interval(
+        low=math.nan,
+        high=math.nan,
+        level=level,
+        kind="confidence",
+        method=f"jackknife of {words[target]}, t",
+        target=target,
+        unit=unit if target == "items" else target,
+        units_are="left out",
+        notes=tuple(notes),
+    )
+    values = _advantages(lost, graded)
+    return _LeftOut(graded=graded, values=values, moved=moved, df=df, interval=interval)
+
+
+def _advantages(lost: _Bools, graded: _Graded) -> Floats:
+    """Return the mean over humans of 1 - b/n, (n_judges,)."""
+    n_items = graded.rated.sum(axis=0)
+    counts = graded.is_tested & (n_items > 0)
+    shares = 1.0 - lost.sum(axis=1)[:, counts] / n_items[counts]
+    return np.asarray(shares.mean(axis=1))
+
+
+def _without_units(
+    lost: _Bools, graded: _Graded, units: Integers
+) -> tuple[Floats, int]:
+    """Return advantages without each unit, and the units of the human with fewest."""
+    # -> (n_judges, n_units)
+    n_items = np.zeros((units.max() + 1, int(graded.is_tested.sum())))
+    np.add.at(n_items, units, graded.rated[:, graded.is_tested])
+    b = np.zeros((len(lost), *n_items.shape))
+    for of_judge, is_lost in zip(b, lost[:, :, graded.is_tested], strict=True):
+        np.add.at(of_judge, units, is_lost)
+    b, n_items = b[:, n_items.any(axis=1)], n_items[n_items.any(axis=1)]
+    left = n_items.sum(axis=0) - n_items
+    left[left == 0.0] = math.nan
+    shares = 1.0 - (b.sum(axis=1, keepdims=True) - b) / left
+    return shares.mean(axis=2), int((n_items > 0).sum(axis=0).min())
+
+
+def _without_humans(graded: _Graded, target: Target) -> Floats:
+    """Return advantages without each human who was tested, (n_judges, n_humans)."""
+    tested = np.flatnonzero(graded.is_tested)
+    if len(tested) < 3:
+        raise ParameterError(
+            f'target: "{target}" needs at least 3 humans, because one is left out; got '
+            f"{len(tested)}"
+        )
+    rest = [graded.without(int(j)) for j in tested]
+    return np.stack([_advantages(of.nearer() == 1, of) for of in rest], axis=1)
+
+
+# -- one human, and a reference --------------------------------------------------------
+
+
+def reference_difference(
+    human: Grades,
+    judge: Grades,
+    reference: Grades,
+    *,
+    epsilon: float = 0.0,
+    level: float = 0.95,
+) -> ScoreTest:
+    """Compare how often a judge and one human have the grade of a reference.
+
+    Parameters
+    ----------
+    human, judge, reference : mapping or Series
+        Grades by item; items with all three count.
+    epsilon : float, optional
+        By how much the human may be better: the hypothesis is that the judge is right
+        less often by at least as much, and `p_greater` is that of its being better.
+    level : float, optional
+        Nominal level of the interval.
+
+    Returns
+    -------
+    ScoreTest
+        Items where the judge alone is right, b, and where the human alone is, c, and
+        the difference of their shares b/n - c/n with Tango's interval.
+
+    Raises
+    ------
+    ParameterError
+        If an option is outside its range.
+    RatingsError
+        If no item has all three grades, or they are of different kinds.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If `epsilon` is 0 and both are right and wrong on the same items.
+
+    Notes
+    -----
+    Without a reference there is nothing to compare: how often a judge and one human
+    agree is `masrel.agreement.percent_agreement`.
+
+    References
+    ----------
+    .. [1] Tango, T. (1998); see `score_test`.
+
+    Examples
+    --------
+    >>> truth = dict(enumerate("abab" * 10))
+    >>> human = truth | {0: "b", 1: "a"}
+    >>> judge = truth | {4: "b"}
+    >>> result = reference_difference(human, judge, truth)
+    >>> result.b, result.c, round(result.low, 3), round(result.high, 3)
+    (2, 1, -0.087, 0.145)
+    """
+    check_share("epsilon", epsilon)
+    places = {"human": human, "judge": judge, "reference": reference}
+    by_item = [_by_item(grades, place) for place, grades in places.items()]
+    items = [item for item in by_item[0] if all(item in of for of in by_item)]
+    codes, _ = label_codes(
+        [[of[item] for of in by_item] for item in items] or [[None] * 3],
+        None,
+        lambda row, column: f"{list(places)[column]}: item {items[row]!r}",
+    )
+    codes = codes[(codes >= 0).all(axis=1)]
+    if not len(codes):
+        raise RatingsError("reference: needs items that human and judge graded, too")
+    of_human, of_judge = codes[:, 0] == codes[:, 2], codes[:, 1] == codes[:, 2]
+    b, c = int((of_judge & ~of_human).sum()), int((of_human & ~of_judge).sum())
+    return score_test(b, c, len(codes), delta=-float(epsilon), level=level)
