@@ -233,7 +233,8 @@ and .6.
   takes t.
 - With z or t alone, PPI++ has next to no width where the judge is never wrong in the
   few labelled items. At a rate of .05 and 10 labels it holds the truth in 40 % or less.
-- Labels alone, padded as well, are as safe, and wider where the judge is good.
+- Labels alone, padded as well, are as safe, and wider where the judge is good. Of any
+  rate, exactly and not drawn, they hold 94 % or more with 5 to 200 labels.
 - Rogan and Gladen's rate with Lang and Reiczigel's interval is safe but wide. Its
   column leaves out studies with the note `few_labels`: fewer than 20 labels, or than 5
   of items that pass or that fail. With so few it may hold the rate in less than 93 %.

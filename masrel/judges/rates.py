@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from masrel._input import check_option, listed, refuse, shown
 from masrel.agreement._engine import check_level, divide, undefined
+from masrel.agreement._labels import is_missing
 from masrel.errors import ParameterError, RatingsError
 
 _Floats = NDArray[np.float64]
@@ -33,14 +34,16 @@ _ASSUMPTIONS: dict[_RateMethod, _Assumption] = {
 # Coverage below 93 % was met only with fewer: docs/judges_evidence.md
 _ENOUGH = {"labels": 10, "numbers": 50, "of_both_kinds": 20, "of_a_kind": 5}
 
-_CORRECTED_OUTSIDE = (
-    "the judge passes fewer items than its false passes alone would give: its errors "
-    "in the labelled items are not those in the others",
-    "the judge passes more items than if all deserved it: its errors in the labelled "
-    "items are not those in the others",
-)
-_POWERED_OUTSIDE = ("the judge grades the labelled items quite unlike the others",) * 2
-_OUTSIDE = {"rogan_gladen": _CORRECTED_OUTSIDE, "prediction_powered": _POWERED_OUTSIDE}
+# Why an interval lies below 0, or above 1
+_OUTSIDE = {
+    "rogan_gladen": (
+        "the judge passes fewer items than its false passes alone would give: its "
+        "errors in the labelled items are not those in the others",
+        "the judge passes more items than if all deserved it: its errors in the "
+        "labelled items are not those in the others",
+    ),
+    "prediction_powered": ("the judge grades labelled items unlike the others",) * 2,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,10 +69,11 @@ class RateEstimate:
     uncut_low, uncut_high : float
         Ends before they are cut; ``nan`` of what has no bounds.
     power : float
-        How much the judge counts in a prediction-powered rate, λ; ``nan`` in others.
+        How much the judge counts beside labels, λ; ``nan`` where it is not defined.
     notes : tuple of {"few_labels", "whole_range"}
-        Fewer labels than a coverage of 93 % needs; an interval that is all of [0, 1],
-        so that nothing was learnt.
+        Fewer labels than a coverage of 93 % needs: 10; of numbers that are not all 0 or
+        1, 50; of a corrected rate, 20 with 5 of each kind. An interval that is all of
+        [0, 1], so that nothing was learnt.
     reason : str or None
         Why the value or the ends are undefined, or None.
     """
@@ -295,9 +299,11 @@ def prediction_powered_mean(
         pool_squared=(pool * pool).mean(),
     )
     value, used = moments.mean(power)
-    low, high = moments.ends(used, _quantile(level))
-    if method == "auto":
-        low, high = moments.jackknife_ends(y, f, power, level)
+    low, high = (
+        moments.ends(used, _quantile(level))
+        if method == "z"
+        else moments.jackknife_ends(y, f, power, level)
+    )
     reason = None
     if np.isnan(low):
         title = "the interval of the prediction-powered mean"
@@ -525,9 +531,10 @@ def labels_needed(
         low, high = expected.padded_ends(power, level)
     widths = (np.clip(high, 0.0, 1.0) - np.clip(low, 0.0, 1.0)) / 2.0
     needed = f"{widths[-1]:.4g} or more, which labels of all {n_items} items give"
-    is_enough = widths <= half_width
-    refuse((not is_enough.any(), f"half_width: needs {needed}, got {half_width}"))
-    return int(n[is_enough.argmax()])
+    refuse((widths[-1] > half_width, f"half_width: needs {needed}, got {half_width}"))
+    # one more than the last number that is too few: cutting may narrow a wide interval
+    too_few = n[widths > half_width]
+    return int(too_few[-1]) + 1 if too_few.size else 2
 
 
 # -- formulas ------------------------------------------------------------------------
@@ -659,10 +666,15 @@ def _corrected(
         value = (rate + q0 - 1.0) / (q0 + q1 - 1.0)
         ends = _lang_reiczigel(rate, n, sensitivity, specificity, _quantile(level))
         numbers = value, *ends
-    few, few_of_a_kind = _ENOUGH["of_both_kinds"], _ENOUGH["of_a_kind"]
-    is_few = m1 + m0 < few or min(m1, m0) < few_of_a_kind
+    n_labels, n_of_a_kind = m1 + m0, min(m1, m0)
     return _estimate(
-        "rogan_gladen", numbers, level, (n, m1 + m0), is_few=is_few, reason=reason
+        "rogan_gladen",
+        numbers,
+        level,
+        (n, n_labels),
+        is_few=n_labels < _ENOUGH["of_both_kinds"]
+        or n_of_a_kind < _ENOUGH["of_a_kind"],
+        reason=reason,
     )
 
 
@@ -775,5 +787,4 @@ def _graded(name: str, grades: Mapping[Any, Any]) -> dict[Any, Any]:
     """Return grades by item, without the missing ones."""
     if not hasattr(grades, "items"):
         raise RatingsError(f"{name}: needs item to grade, got {shown(grades)}")
-    # nan is the one that differs from itself
-    return {item: of for item, of in grades.items() if of is not None and of == of}
+    return {item: of for item, of in grades.items() if not is_missing(of)}

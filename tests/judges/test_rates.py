@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import fisher_exact, norm, t
+from scipy.stats import binom, fisher_exact, norm, t
 
 from docs.make.judge_rates import BEGIN, END, JUDGES, PAGE, ROWS, rows, section
 from masrel.errors import ParameterError, UndefinedStatisticWarning
@@ -178,7 +178,7 @@ def test_of_a_perfect_judge_all_rates_are_its_own() -> None:
 def test_rates_side_by_side_are_those_of_their_functions() -> None:
     labels, judge = graded({"pp": 40, "pf": 10, "fp": 6, "ff": 44, "-p": 70, "-f": 80})
     labels |= {"unseen": "p", 3: None}
-    judge[4] = math.nan
+    judge |= {4: math.nan, "new": pd.NA}
     result = rate_estimates(pd.Series(labels), judge, grade="p")
     corrected = corrected_rate(
         result.rows[0].value, 249, sensitivity=(38 / 48, 48), specificity=(44 / 50, 50)
@@ -240,6 +240,24 @@ def test_so_many_labels_give_the_width(method: Any) -> None:
         row = by_method({"pp": a, "pf": b, "fp": c, "ff": d, **others})[method]
         halves.append((row.high - row.low) / 2)
     assert np.mean(halves) == pytest.approx(0.1, rel=0.06)
+
+
+@pytest.mark.parametrize("n", [5, 10, 20, 30, 50, 100, 200])
+def test_labels_alone_hold_any_rate_in_94_in_100(n: int) -> None:
+    # exactly: every number of labels that pass, with its probability
+    passed = np.arange(n + 1)
+    rates = np.linspace(0.002, 0.5, 250)
+    pool = [0, 1]
+    ends = [
+        prediction_powered_mean([1] * k + [0] * (n - k), [0] * n, pool, power=0.0)
+        for k in passed
+    ]
+    low, high = (
+        np.array([getattr(of, name) for of in ends]) for name in ("low", "high")
+    )
+    holds = (low <= rates[:, None]) & (rates[:, None] <= high)
+    coverage = (binom.pmf(passed, n, rates[:, None]) * holds).sum(axis=1)
+    assert coverage.min() >= 0.94
 
 
 FOUND = list(csv.DictReader(ROWS.read_text("utf-8").splitlines()))
