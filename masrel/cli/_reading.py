@@ -140,7 +140,8 @@ reading_options = [
         "--from",
         "source",
         metavar="TOOL",
-        help="Export of label-studio, doccano, prodigy or inception.",
+        help="Tool whose export it is: label-studio, doccano, prodigy, inception; "
+        "inspect-ai, lm-eval, promptfoo, mlflow, langsmith, langfuse, mt-bench.",
     ),
 ]
 """Options of verbs that read a file of ratings."""

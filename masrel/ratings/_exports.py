@@ -1,22 +1,21 @@
-"""Files of other programs as sheets: workbooks, Parquet, JSON, SPSS, annotation tools.
+"""Files of other programs as sheets: workbooks, Parquet, JSON, SPSS, exports of tools.
 
-An annotation tool has a function from a record to its `_Annotation`s: who gave which
-item which category. Only categories of whole documents are read; several of them at
-once, spans and relations are refused.
+What the records of an export say is in `_tools`.
 """
 
+import binascii
 import csv
 import io
 import json
 import re
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain, compress
-from pathlib import Path
-from typing import Any, NamedTuple
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -47,6 +46,7 @@ from masrel.ratings._sheet import (
     unzipped,
     value_text,
 )
+from masrel.ratings._tools import TOOLS, Annotation
 
 _TABLE = "the data"  # what a table in memory is called
 
@@ -60,6 +60,7 @@ _PYREADSTAT = {
     ".xpt": "read_xport",
 }
 
+_MORE = 16  # times as much may be in an archive that is read file by file
 _MAX_WORKBOOK = MAX_UNPACKED // 4  # bytes of XML: its cells take several times the room
 _ZIP = b"PK\3\4"  # how an archive begins
 # a cell of type error: its formula, if any, and its value
@@ -183,10 +184,19 @@ def read_typed(
         raise ParameterError(
             f"--encoding: needed a file of text, got {facts['format']}, whose is known"
         )
-    dropped = dict[str, int]()
-    if options.source is not None:
-        records = _records(name, suffix, data)
-        frame, facts, dropped = _export(name, options.source, records, options.grade)
+    source, extras = options.source, dict[str, Any]()
+    if source not in (None, *TOOLS):
+        raise ParameterError(f"--from: needed {', '.join(TOOLS)}, got {source!r}")
+    is_json = source is None and suffix in (".json", ".jsonl")
+    values = _json_values(name, suffix, data) if is_json else []
+    records = [*_within(values)]
+    if source is None:
+        is_log = suffix == ".eval"
+        source = "inspect-ai" if is_log else _recognized(name, records, options)
+    if source is not None:
+        placed = (("", each) for each in records) if is_json else None
+        export = placed or _records(name, suffix, data, source)
+        frame, facts, extras = _export(name, source, export, options.grade)
     elif suffix in WORKBOOKS:
         rows, n_above = _workbook(name, suffix, data, options.sheet, facts)
         return _sheet_of_rows(name, sha256, rows, n_above, facts, options)
@@ -197,8 +207,8 @@ def read_typed(
     elif suffix in _PYREADSTAT:
         frame = _statistical(name, suffix, data, options.encoding, facts)
     else:
-        frame = _objects(name, _json_values(name, suffix, data), options)
-    return replace(sheet_of(name, sha256, frame, facts), dropped=dropped)
+        frame = _objects(name, values, options)
+    return replace(sheet_of(name, sha256, frame, facts), **extras)
 
 
 def sheet_of(
@@ -258,7 +268,9 @@ def _workbook(
         sheets = r"xl/worksheets/.*\.xml"  # not of .ods
         files = unzipped(name, suffix, data, _MAX_WORKBOOK, do, sheets)
         # errors of formulas, such as #N/A, which calamine gives as empty cells
-        errors = Counter(e for xml in files.values() for e in _ERROR_CELL.findall(xml))
+        errors = Counter(
+            e for xml in files.values() for e in _ERROR_CELL.findall(xml())
+        )
         if errors:
             facts["errors"] = {
                 e.decode("utf-8", "replace"): n for e, n in errors.items()
@@ -396,6 +408,7 @@ def _objects(name: str, values: list[Any], options: Reading) -> pd.DataFrame:
     # names of raters and items in each other
     if not values or not all(isinstance(value, dict) for value in values):
         raise refusal(name, "no objects")
+    values = _joined(values)
     only, kinds = values[0], set(map(type, values[0].values()))
     if len(values) == 1 and kinds in ({dict}, {list}):
         if _are_columns(only):
@@ -408,6 +421,15 @@ def _objects(name: str, values: list[Any], options: Reading) -> pd.DataFrame:
             return _two_levels(name, [*only.items()], options, are_items=False)
     nested = _annotated(name, values, options)
     return pd.DataFrame(values, dtype=object) if nested is None else nested
+
+
+def _joined(values: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    # objects of objects are one, if none has a name of another: files in a row
+    names = [*chain(*values)]
+    is_nested = all(isinstance(of, dict) for value in values for of in value.values())
+    if not is_nested or len(set(names)) < len(names):
+        return values
+    return [dict(chain(*(value.items() for value in values)))]
 
 
 def _are_columns(columns: dict[str, Any]) -> bool:
@@ -431,14 +453,11 @@ def _annotated(
         item = next((record[key] for key in _ID if key in record), number)
         of = next((record[key] for key in _GIVEN if key in record), ())
         raters = record.get("annotators", record.get("raters"))
-        if isinstance(of, dict):
+        pairs = _pairs(name, item, raters, of)
+        if pairs is not None:
+            rows += [{"item": item, "rater": who, "grade": got} for who, got in pairs]
+        elif isinstance(of, dict):
             levels.append((item, of))
-        elif isinstance(of, str | list) and isinstance(raters, str | list):
-            both = [x.split(",") if isinstance(x, str) else x for x in (raters, of)]
-            if len(both[0]) != len(both[1]):
-                raise refusal(name, "lists", item=item, raters=both[0], grades=both[1])
-            for who, grade in zip(*both, strict=True):
-                rows.append({"item": item, "rater": who, "grade": grade})
         elif isinstance(of, list) and all(isinstance(each, dict) for each in of):
             rows += [{**each, "item": item} for each in of]
     if levels and not rows:
@@ -453,6 +472,18 @@ def _annotated(
     is_nested = frame.map(lambda cell: isinstance(cell, dict | list)).any()
     nested = [key for key in frame.columns[is_nested] if key not in _USUAL]
     return frame.drop(columns=nested)
+
+
+def _pairs(name: str, item: Any, raters: Any, of: Any) -> Sequence[Any] | None:
+    # who gave an item which grade, where its raters are listed beside its grades
+    if not isinstance(raters, str | list) or not isinstance(of, str | list | dict):
+        return None
+    if isinstance(of, dict):
+        return [*of.items()]
+    both = [x.split(",") if isinstance(x, str) else x for x in (raters, of)]
+    if len(both[0]) != len(both[1]):
+        raise refusal(name, "lists", item=item, raters=both[0], grades=both[1])
+    return [*zip(*both, strict=True)]
 
 
 def _two_levels(
@@ -476,48 +507,83 @@ def _two_levels(
     return pd.DataFrame(rows, columns=["item", *raters], dtype=object)
 
 
-# ---- annotation tools ----
+# ---- exports of tools ----
+
+# Where the records are in an object of a whole file.
+_WITHIN = (("samples",), ("results", "results"), ("traces",), ("data",))
 
 
-class _Annotation(NamedTuple):
-    """What an annotator gave an item."""
+def _within(values: list[Any]) -> Iterator[Any]:
+    for value in values:
+        for path in _WITHIN:
+            inner = value
+            for key in path:
+                inner = inner.get(key) if isinstance(inner, dict) else None
+            if isinstance(inner, list):
+                yield from inner
+                break
+        else:
+            yield value
 
-    item: Any
-    rater: Any
-    grades: dict[str, Any]  # by field; several in a list
-    text: Any = None  # what was annotated
-    why: str = ""  # it is left out
 
-
-def _records(name: str, suffix: str, data: bytes) -> list[tuple[str, Any]]:
-    # the values of an export, each with the name of its file in an archive
-    if not data.startswith(_ZIP):  # a pipe has no name that says .zip
-        return [("", value) for value in _json_values(name, suffix, data)]
-    do = "unpack it and leave files out"
-    files = unzipped(name, ".zip", data, MAX_UNPACKED, do, r".*\.(jsonl?|csv)")
-    if not files:
-        raise refusal(name, "no export")
-    return [
-        (Path(file).stem, value)
-        for file, content in files.items()
-        for value in _json_values(f"{name}: {file}", Path(file).suffix.lower(), content)
+def _recognized(name: str, records: list[Any], options: Reading) -> str | None:
+    # the tool whose keys all records have, unless columns are named
+    is_named = options.item or options.rater or options.raters
+    if is_named or not all(isinstance(record, dict) for record in records):
+        return None
+    keys = set.intersection(*(set(record) for record in records or [{}]))
+    sources = [
+        source
+        for source, tool in TOOLS.items()
+        if any(keys.issuperset(of.split()) for of in tool.keys)
     ]
+    if len(sources) > 1:
+        raise refusal(
+            name,
+            "sources",
+            options=" or ".join(f"--from {source}" for source in sources),
+        )
+    return sources[0] if sources else None
+
+
+def _records(
+    name: str, suffix: str, data: bytes, source: str
+) -> Iterator[tuple[str, Any]]:
+    # the records of an export, each with the name of its file in an archive
+    if suffix in _ARROW:
+        read = partial(library(name, _ARROW[suffix]).read_table, io.BytesIO(data))
+        yield from (("", row) for row in read_foreign(name, suffix, read).to_pylist())
+    elif not data.startswith(_ZIP):  # a pipe has no name that says .zip
+        yield from (
+            ("", record) for record in _within(_json_values(name, suffix, data))
+        )
+    else:
+        # a log of inspect_ai has summaries beside its samples, which are large
+        is_log, do = source == "inspect-ai", "unpack it and leave files out"
+        most = MAX_UNPACKED * (_MORE if is_log else 1)
+        chosen = "samples/.*[.]json" if is_log else r".*\.(jsonl?|csv)"
+        files = unzipped(name, suffix or ".zip", data, most, do, chosen)
+        if not files:
+            raise refusal(name, "no export")
+        for file, content in files.items():
+            path = PurePosixPath(file)
+            values = _json_values(f"{name}: {file}", path.suffix.lower(), content())
+            yield from ((str(path.with_suffix("")), each) for each in _within(values))
 
 
 def _export(
-    name: str, source: str, records: list[tuple[str, Any]], chosen: str | None
-) -> tuple[pd.DataFrame, dict[str, Any], dict[str, int]]:
-    # columns item, rater, the grade, and text where it has any; its facts, and why
-    # annotations are left out
-    if source not in _TOOLS:
-        raise ParameterError(f"--from: needed {', '.join(_TOOLS)}, got {source!r}")
+    name: str, source: str, records: Iterable[tuple[str, Any]], chosen: str | None
+) -> tuple[pd.DataFrame, dict[str, Any], dict[str, Any]]:
+    # columns item, rater, the grade, and text and cluster where there are any; facts;
+    # why annotations are left out, and findings
+    tool = TOOLS[source]
     try:
-        annotations = [
-            g for who, record in records for g in _TOOLS[source](who, record)
-        ]
-    except (TypeError, AttributeError, KeyError) as error:
+        annotations = [g for who, record in records for g in tool.read(who, record)]
+    except (TypeError, AttributeError, LookupError, binascii.Error) as error:
         raise refusal(name, "shape", source=source, error=error) from error
-    fields = list(dict.fromkeys(field for g in annotations for field in g.grades))
+    fields = list(
+        dict.fromkeys(field for g in annotations if not g.why for field in g.grades)
+    )
     if not fields:
         raise refusal(name, "no fields")
     of = fields[0] if chosen is None else chosen
@@ -526,25 +592,46 @@ def _export(
         raise refusal(name, "fields", fields=", ".join(fields), got=got)
     if chosen in ("item", "rater"):
         raise refusal(name, "field's name", chosen=chosen)
-    rows, dropped = [], Counter[str]()
+    used, dropped = [], Counter[str]()
     for who in annotations:
-        # an answer of Prodigy is to one label; others ask for all fields at once
-        if who.why or (source == "prodigy" and of not in who.grades):
-            dropped[who.why or "of other labels"] += 1
+        if who.why or (tool.is_split and of not in who.grades):
+            dropped[who.why or "of other fields"] += 1
         else:
-            rows.append(_row(name, who, of))
-    if not rows:
+            used.append(who)
+    if not used:
         raise refusal(name, "no rating", field=of)
-    frame = pd.DataFrame(
-        rows, columns=["item", "rater", chosen or "grade", "text"], dtype=object
-    )
-    if frame.iloc[:, 3].isna().all() or chosen == "text":
-        frame = frame.iloc[:, :3]
-    return frame, {"format": f"{source} export", "field": of}, dict(dropped)
+    used = _by_kind(used)
+    names = ["item", "rater", chosen or "grade", "text", "cluster"]
+    rows = [_row(name, who, of) for who in used]
+    frame = pd.DataFrame(rows, columns=names, dtype=object)
+    is_there = [*frame.notna().any()]
+    is_there = [
+        k < 3 or (is_so and names[k] != chosen) for k, is_so in enumerate(is_there)
+    ]
+    facts: dict[str, Any] = {"format": f"{source} export", "field": of}
+    if kinds := {str(who.rater): who.kind for who in used if who.kind}:
+        facts["kinds"] = kinds
+    notes = Counter(who.note for who in used if who.note)
+    findings = tuple(Finding(note, n=n) for note, n in notes.items())
+    extras = {"dropped": dict(dropped), "findings": findings}
+    return frame.loc[:, is_there], facts, extras
 
 
-def _row(name: str, who: _Annotation, field: str) -> tuple[Any, Any, Any, str | None]:
-    # item, rater, the one grade, and the text
+def _by_kind(annotations: list[Annotation]) -> list[Annotation]:
+    # raters of one name and several kinds, such as a person and a judge, are several
+    kinds: dict[Any, set[str]] = {}
+    for who in annotations:
+        kinds.setdefault(str(who.rater), set()).add(who.kind)
+    return [
+        who._replace(rater=f"{who.rater} ({who.kind})")
+        if who.kind and len(kinds[str(who.rater)]) > 1
+        else who
+        for who in annotations
+    ]
+
+
+def _row(name: str, who: Annotation, field: str) -> tuple[Any, ...]:
+    # item, rater, the one grade, the text and the cluster
     grade = who.grades.get(field)
     labels = grade if isinstance(grade, list) else [grade]
     wrong = {
@@ -558,95 +645,4 @@ def _row(name: str, who: _Annotation, field: str) -> tuple[Any, Any, Any, str | 
             got = ", ".join(map(str, labels))[:60]
             raise refusal(name, code, item=who.item, rater=who.rater, got=got)
     text = who.text if isinstance(who.text, str) else None
-    return who.item, who.rater, labels[0] if labels else None, text
-
-
-def _label_studio(_: str, task: dict[str, Any]) -> Iterator[_Annotation]:
-    if "annotator" in task and "annotations" not in task:
-        # its JSON-MIN has one object an annotation, data and results side by side
-        grades = {key: _labels(v) for key, v in task.items() if key not in _ABOUT}
-        yield _Annotation(task.get("id"), task["annotator"], grades, task.get("text"))
-        return
-    data = task.get("data") or {}
-    only = next(iter(data.values())) if len(data) == 1 else None
-    for annotation in task.get("annotations") or task.get("completions") or ():
-        who = annotation.get("completed_by")
-        if isinstance(who, dict):
-            who = who.get("email") or who.get("id")
-        grades = {}
-        for result in annotation.get("result") or ():
-            value = result.get("value")
-            if _is_category(value):
-                of = grades.setdefault(str(result.get("from_name")), [])
-                of += _labels(value)
-        is_skipped = annotation.get("was_cancelled") or annotation.get("skipped")
-        why = "skipped" if is_skipped else ""
-        yield _Annotation(task.get("id"), who, grades, data.get("text", only), why)
-
-
-# The keys of Label Studio's results that are categories, and what its JSON-MIN has
-# beside the task's data and the results.
-_CATEGORIES = {"choices", "rating", "number", "taxonomy", "selected"}
-_ABOUT = ("id", "annotator", "annotation_id", "created_at", "updated_at", "lead_time")
-
-
-def _is_category(value: Any) -> bool:
-    # of the whole task: beside that of a region stands its place
-    return isinstance(value, dict) and len(value) == 1 and value.keys() <= _CATEGORIES
-
-
-def _labels(value: Any) -> Any:
-    # the categories of a result, of a taxonomy by their path from the root
-    if isinstance(value, list) and len(value) == 1:
-        value = value[0]
-    if not _is_category(value):
-        return value
-    ((_, labels),) = value.items()
-    several = labels if isinstance(labels, list) else [labels]
-    return ["/".join(map(str, x)) if isinstance(x, list) else x for x in several]
-
-
-def _doccano(who: str, example: dict[str, Any]) -> Iterator[_Annotation]:
-    rater = example.get("username", example.get("user", who))
-    text = example.get("text", example.get("filename"))
-    keys = {"label", "labels", "cats"} & example.keys()
-    if keys:
-        grades = {key: example[key] for key in sorted(keys)}
-        yield _Annotation(example.get("id"), rater, grades, text)
-    for label in example.get("annotations") or ():  # old: labels, users by number
-        grade = label if "start_offset" in label else label.get("label")
-        yield _Annotation(
-            example.get("id"), label.get("user"), {"annotations": grade}, text
-        )
-
-
-def _prodigy(who: str, task: dict[str, Any]) -> Iterator[_Annotation]:
-    answer, why = task.get("answer"), ""
-    is_choice = "accept" in task or "options" in task
-    if answer == "ignore" or (is_choice and answer != "accept"):
-        why = f"answered {answer or 'nothing'}"
-    regions = task.get("spans") or task.get("relations")
-    if is_choice:
-        grades = {"accept": task.get("accept", [])}
-    elif task.get("label") is not None:
-        grades = {str(task["label"]): answer}
-    else:
-        grades = {"answer": regions or answer}
-    rater = task.get("_annotator_id") or task.get("_session_id") or who
-    yield _Annotation(task.get("_input_hash"), rater, grades, task.get("text"), why)
-
-
-def _inception(_: str, row: dict[str, Any]) -> Iterator[_Annotation]:
-    if other := row.keys() - {"doc", "user", "label"}:
-        raise KeyError(f"columns of spans or chains, {', '.join(map(str, other))}")
-    is_other = row["user"] in ("CURATION_USER", "INITIAL_CAS")
-    why = "of the curator or the source" if is_other else ""
-    yield _Annotation(row["doc"], row["user"], {"label": row["label"]}, why=why)
-
-
-_TOOLS: dict[str, Callable[[str, Any], Iterator[_Annotation]]] = {
-    "label-studio": _label_studio,
-    "doccano": _doccano,
-    "prodigy": _prodigy,
-    "inception": _inception,
-}
+    return who.item, who.rater, labels[0] if labels else None, text, who.cluster

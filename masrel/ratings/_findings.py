@@ -74,7 +74,8 @@ class Reading:
         Whether it is a table of counts, items by categories, or a contingency table
         of two raters, the first of them in the rows.
     source : str or None
-        The annotation tool whose export it is.
+        The tool whose export it is, of annotation or of evaluation; most of the
+        latter are recognized.
     stream : bool or None
         Whether DuckDB groups it to the rows of ratings that differ, so that a
         file may be larger than memory; by its size unless given.
@@ -393,6 +394,11 @@ _TEXTS = {
     "no objects": "needed a JSON list of objects, one a row",
     "shape": "is no export of {source}, or damaged: a record has another shape "
     "({error})",
+    "sources": "has the keys of more than one tool: {options} says whose it is",
+    "zstd": "is packed by zstd, which pyarrow reads: pip install 'masrel[files]'; or "
+    "inspect log convert --to json makes a log that needs nothing",
+    "inconsistent": "judgements that differ with the order of the answers count as "
+    "ties: {n}",
     "no fields": "needed labels of whole items, got none; spans, regions and relations "
     "are not read",
     "fields": "--grade: needed one of its fields, {fields}, got {got}",

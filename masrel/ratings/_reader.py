@@ -1,7 +1,8 @@
 """Any file of ratings, in whatever shape its program left it, as ratings.
 
 In: a path and what the caller says of it. Out: a `RatingsFile` with what was read. The
-stages: `_sheet` or `_exports` (a file as columns of text), `_layout` (which column is
+stages: `_sheet` or `_exports` (a file as columns of text; `_tools` has what exports of
+annotation and evaluation tools say), `_layout` (which column is
 what), `_grade_texts` (which grade a text is), and here ratings put together item by
 rater, or tables of counts; `_large` is for large files. `_findings` has
 the texts of all that is refused or warned of.

@@ -10,6 +10,7 @@ import io
 import lzma
 import math
 import re
+import struct
 import sys
 import unicodedata
 import zipfile
@@ -21,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from decimal import Decimal
 from functools import partial
+from importlib.util import find_spec
 from itertools import chain, count, islice, takewhile
 from pathlib import Path
 from typing import Any
@@ -30,14 +32,14 @@ from numpy.typing import NDArray
 
 from masrel._interpreter import collector_off
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._findings import Finding, Reading, refusal
+from masrel.ratings._findings import Finding, Reading, library, refusal
 
 Codes = NDArray[np.int64]
 
 TEXT_FORMATS = {".csv": "CSV", ".tsv": "TSV", ".txt": "text", ".dat": "text"}
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 TYPED_FORMATS = (
-    *(*WORKBOOKS, ".parquet", ".feather", ".json", ".jsonl"),
+    *(*WORKBOOKS, ".parquet", ".feather", ".json", ".jsonl", ".eval"),
     *(".sav", ".zsav", ".por", ".dta", ".sas7bdat", ".xpt"),
 )
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
@@ -57,6 +59,7 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+_ZSTD = 93  # how a member of an archive is packed
 _PACKED = {b"\x1f\x8b": ".gz", b"\xfd7zXZ\0": ".xz"}  # how packed files begin
 _OPENED: dict[str, Callable[..., Any]] = {".gz": gzip.open, ".xz": lzma.open}
 _MARKS = {  # how files begin that are no text, and what their names end in
@@ -293,21 +296,46 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
     files = unzipped(name, suffix, data, MAX_UNPACKED, _PIECE_BY_PIECE, ".*[^/]")
     if len(files) != 1:
         raise refusal(name, "members", n=len(files), members=", ".join(list(files)[:5]))
-    return next(iter(files.items()))
+    ((inner, read),) = files.items()
+    return inner, read()
 
 
 def unzipped(
     name: str, suffix: str, data: bytes, most: int, do: str, chosen: str
-) -> dict[str, bytes]:
-    """Return files of an archive that are chosen, if all fits the memory."""
+) -> dict[str, Callable[[], bytes]]:
+    """Return what reads each file of an archive that is chosen, if all is small."""
     # chosen: what matches their names; do: what is to be done if it does not fit
     packed = read_foreign(name, suffix, lambda: zipfile.ZipFile(io.BytesIO(data)))
     if sum(member.file_size for member in packed.infolist()) > most:
         raise refusal(name, "unpacked", most=most, do=do)
     # a Mac adds a folder to every archive
     meant = re.compile(f"(?!__MACOSX/)({chosen})", re.IGNORECASE | re.DOTALL)
-    files = filter(meant.fullmatch, packed.namelist())
-    return {f: read_foreign(name, suffix, partial(packed.read, f)) for f in files}
+    files = [member for member in packed.infolist() if meant.fullmatch(member.filename)]
+    is_new = any(member.compress_type == _ZSTD for member in files)
+    read: Callable[[zipfile.ZipInfo], bytes] = packed.read
+    if is_new and not hasattr(zipfile, "ZIP_ZSTANDARD"):  # there from Python 3.14 on
+        if find_spec("pyarrow") is None:
+            raise refusal(name, "zstd")
+        read = partial(_zstd_member, library(name, "pyarrow"), data)
+    return {
+        member.filename: partial(read_foreign, name, suffix, partial(read, member))
+        for member in files
+    }
+
+
+def _zstd_member(pyarrow: Any, data: bytes, member: zipfile.ZipInfo) -> bytes:
+    # what zstd packed: its own header is 30 bytes and two fields whose length it has
+    lengths = struct.unpack_from("<HH", data, member.header_offset + 26)
+    begin = member.header_offset + 30 + sum(lengths)
+    content: bytes = pyarrow.decompress(
+        data[begin : begin + member.compress_size],
+        decompressed_size=member.file_size,
+        codec="zstd",
+        asbytes=True,
+    )
+    if zlib.crc32(content) != member.CRC:
+        raise zipfile.BadZipFile(f"Bad CRC-32 for file {member.filename!r}")
+    return content
 
 
 def read_foreign(

@@ -95,8 +95,13 @@ def _of_grades(file: RatingsFile) -> list[str]:
     name = " (Modified Ashworth Scale)" if scale.name == "MAS" else ""
     codes = ", ".join(f"{n} {c or 'empty'}" for c, n in read["missing"].items())
     rows = ", ".join(f"{n} {why}" for why, n in read["dropped"].items())
+    kinds: dict[str, list[str]] = {}
+    for rater, kind in read.get("kinds", {}).items():
+        kinds.setdefault(kind, []).append(rater)
+    by = "; ".join(f"{kind} {', '.join(of[:_SHOWN])}" for kind, of in kinds.items())
     same = [" = ".join(of) for of in read["merged"].values() if len(of) > 1]
     texts = {
+        f"Kinds of raters: {by}.": by,
         f"Grades{name}: {listed}.": True,
         f"Missing: {codes or read['n_missing']}.": read["n_missing"],
         f"Repeated: {repeated}, {read['repeated']} taken.": repeated,

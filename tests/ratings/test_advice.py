@@ -252,6 +252,22 @@ TABLE: dict[str, Asked] = {
             )
         },
     ),
+    "an export of one of two tools": Asked(
+        code="sources",
+        name="r.json",
+        text=json.dumps(
+            [
+                {
+                    **{"doc_id": f"{run}{who}", "filter": "none", "metrics": ["f"]},
+                    **{"f": grade, "run_id": run, "key": "f", "value": grade},
+                    "feedback_source": {"type": "app", "user_name": who},
+                }
+                for who, both in (("Kim", "xy"), ("Lee", "xx"))
+                for run, grade in zip("ab", both, strict=True)
+            ]
+        ),
+        tries={"--from lm-eval": "x y x x", "--from langsmith": "xx yx"},
+    ),
     "names in two levels": Asked(
         code="levels",
         name="r.json",
@@ -692,7 +708,10 @@ TABLE: dict[str, Asked] = {
 }
 
 # Findings whose texts name options, and no row of the table.
-NO_ROW = {"unpacked": "says to unpack the file, and names no option"}
+NO_ROW = {
+    "unpacked": "says to unpack the file, and names no option",
+    "zstd": "names a command of another program",
+}
 
 
 def words_of(command: str) -> list[Suggestion]:

@@ -224,7 +224,7 @@ READ: dict[str, tuple[str, str, Any, dict[str, Any], Any, dict[str, int]]] = {
     ),
     "a decision on one of two labels": (
         *("prodigy", "two.jsonl", lines(*TWO_LABELS), {"grade": "ECO"}),
-        *({("1", "kim"): "accept", ("1", "lee"): "reject"}, {"of other labels": 1}),
+        *({("1", "kim"): "accept", ("1", "lee"): "reject"}, {"of other fields": 1}),
     ),
     "labels of documents": (
         *("inception", "agr.csv"),
