@@ -5,7 +5,7 @@ near to the other humans as each of them is, tests of that, and intervals.
 """
 
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
@@ -45,7 +45,7 @@ EPSILONS: Mapping[str, float] = {"expert": 0.2, "skilled": 0.15, "crowd": 0.1}
 class Grades(Protocol):
     """Grades by item: a dict, a pandas Series, or another thing that has `items`."""
 
-    def items(self) -> Collection[tuple[Any, Any]]:
+    def items(self) -> Iterable[tuple[Any, Any]]:
         """Return pairs of item and grade."""
         ...
 

@@ -5,9 +5,9 @@ mean, with an interval for other items like these.
 """
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,9 @@ from masrel._input import check_option, listed, refuse, shown
 from masrel.agreement._engine import check_level, divide, undefined
 from masrel.agreement._labels import is_missing
 from masrel.errors import ParameterError, RatingsError
+
+if TYPE_CHECKING:
+    from masrel.judges.annotators import Grades
 
 _Floats = NDArray[np.float64]
 _Number = Any  # a float, or an array of them
@@ -325,8 +328,8 @@ def prediction_powered_mean(
 
 
 def rate_estimates(
-    labels: Mapping[Any, Any],
-    judge: Mapping[Any, Any],
+    labels: "Grades",
+    judge: "Grades",
     *,
     grade: Hashable,
     level: float = 0.95,
@@ -783,7 +786,7 @@ def _numbers(name: str, values: ArrayLike) -> _Floats:
     return array
 
 
-def _graded(name: str, grades: Mapping[Any, Any]) -> dict[Any, Any]:
+def _graded(name: str, grades: "Grades") -> dict[Any, Any]:
     """Return grades by item, without the missing ones."""
     if not hasattr(grades, "items"):
         raise RatingsError(f"{name}: needs item to grade, got {shown(grades)}")
