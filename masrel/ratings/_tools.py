@@ -219,7 +219,7 @@ def _mlflow(_: str, trace: _Record) -> Iterator[Annotation]:
             f"{info['trace_id']}/{span}" if span in inner else info["trace_id"],
             source["source_id"],
             {each["assessment_name"]: (each.get("feedback") or {}).get("value")},
-            why="expected values" if "expectation" in each else why,
+            why="of expected values" if "expectation" in each else why,
             kind=_KINDS.get(source["source_type"], ""),
             cluster=info["trace_id"],
         )
@@ -255,7 +255,9 @@ def _langfuse(_: str, record: _Record) -> Iterator[Annotation]:
         "/".join(parts) or score.get("sessionId") or score.get("datasetRunId"),
         score.get("authorUserId") or (source if source != "ANNOTATION" else None),
         {score["name"]: label if label not in (None, "") else score.get("value")},
-        why="texts" if score.get("dataType") in ("TEXT", "CORRECTION") else "",
+        why="of texts or corrections"
+        if score.get("dataType") in ("TEXT", "CORRECTION")
+        else "",
         kind=_KINDS.get(source, ""),
         cluster=trace,
     )

@@ -98,10 +98,12 @@ def _of_grades(file: RatingsFile) -> list[str]:
     kinds: dict[str, list[str]] = {}
     for rater, kind in read.get("kinds", {}).items():
         kinds.setdefault(kind, []).append(rater)
-    by = "; ".join(f"{kind} {', '.join(of[:_SHOWN])}" for kind, of in kinds.items())
+    by = ". ".join(
+        f"{kind.capitalize()}: {', '.join(of[:_SHOWN])}" for kind, of in kinds.items()
+    )
     same = [" = ".join(of) for of in read["merged"].values() if len(of) > 1]
     texts = {
-        f"Kinds of raters: {by}.": by,
+        f"{by}.": by,
         f"Grades{name}: {listed}.": True,
         f"Missing: {codes or read['n_missing']}.": read["n_missing"],
         f"Repeated: {repeated}, {read['repeated']} taken.": repeated,

@@ -300,7 +300,7 @@ READ: dict[str, tuple[str | None, Any, dict[str, Any], Any, dict[str, int], Kind
             ("tr-1", "default (model)"): "true",
             ("tr-1", "default (code)"): None,
         },
-        {"no longer valid": 1, "expected values": 1},
+        {"no longer valid": 1, "of expected values": 1},
         {
             **{"kim@x.org": "human", "openai:/gpt-4o": "model"},
             **{"default (model)": "model", "default (code)": "code"},
@@ -389,7 +389,7 @@ READ: dict[str, tuple[str | None, Any, dict[str, Any], Any, dict[str, int], Kind
             **{("t1", "kim"): "warm", ("t1", "EVAL"): "cold", ("t1", "API"): None},
             **{("t1/o1", "kim"): None, ("t1/o1", "EVAL"): None, ("t1/o1", "API"): "3"},
         },
-        *({"texts": 1}, {"kim": "human", "EVAL": "model"}),
+        *({"of texts or corrections": 1}, {"kim": "human", "EVAL": "model"}),
     ),
     "keys as in files, and subjects as in the third version": (
         "langfuse",
