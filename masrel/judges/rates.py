@@ -35,7 +35,7 @@ _ASSUMPTIONS: dict[_RateMethod, _Assumption] = {
 }
 
 # Coverage below 93 % was met only with fewer: docs/judges_evidence.md
-_ENOUGH = {"labels": 10, "numbers": 50, "of_both_kinds": 20, "of_a_kind": 5}
+_ENOUGH = {"labels": 10, "numbers": 50, "z": 200, "of_both_kinds": 20, "of_a_kind": 5}
 
 # Why an interval lies below 0, or above 1
 _OUTSIDE = {
@@ -204,7 +204,7 @@ def prediction_powered_mean(
     unlabelled: ArrayLike,
     *,
     power: float | None = None,
-    method: _MeanMethod = "auto",
+    method: _MeanMethod = "z",
     level: float = 0.95,
 ) -> RateEstimate:
     """Estimate a mean from labels of few items and predictions of all.
@@ -219,9 +219,10 @@ def prediction_powered_mean(
         What the judge says of the other items.
     power : float, optional
         How much predictions count, λ in [0, 1]; estimated when not given.
-    method : {"auto", "z"}, optional
-        The interval: "z" is PPI++'s, which is too short with few labels; "auto" is the
-        one that held its level in the study of coverage.
+    method : {"z", "auto"}, optional
+        The interval: "z" is PPI++'s as published, which is too short with few labels,
+        of a rare grade up to hundreds of them; "auto" is the one that held its level in
+        the study of coverage, and that `rate_estimates` takes.
     level : float, optional
         Level of the interval.
 
@@ -267,6 +268,7 @@ def prediction_powered_mean(
     ...     [1, 0, 1, 1, 0, 1, 0, 1, 1, 0],
     ...     [1, 0, 1, 0, 0, 1, 1, 1, 1, 0],
     ...     [1] * 60 + [0] * 40,
+    ...     method="auto",
     ... )
     >>> print(f"{result.value:.3f} ({result.low:.3f} to {result.high:.3f})")
     0.600 (0.306 to 0.859)
@@ -284,8 +286,8 @@ def prediction_powered_mean(
         (m < 1, "unlabelled: needs the prediction of an item or more, got none"),
         error=RatingsError,
     )
-    is_binary = all(np.isin(values, (0.0, 1.0)).all() for values in (y, f, pool))
-    if is_binary and method == "auto":
+    is_z = method == "z"
+    if not is_z and all(np.isin(of, (0.0, 1.0)).all() for of in (y, f, pool)):
         moments = _share_moments(n, m, y.mean(), f.mean(), (y * f).mean(), pool.mean())
         return _powered(moments, power, level)
     # numbers less the first: a common offset costs no digits
@@ -304,7 +306,7 @@ def prediction_powered_mean(
     value, used = moments.mean(power)
     low, high = (
         moments.ends(used, _quantile(level))
-        if method == "z"
+        if is_z
         else moments.jackknife_ends(y, f, power, level)
     )
     reason = None
@@ -319,10 +321,10 @@ def prediction_powered_mean(
         level=level,
         n_judged=n + m,
         n_labels=n,
-        interval_method="normal" if method == "z" else "jackknife",
+        interval_method="normal" if is_z else "jackknife",
         assumption="labels_are_random",
         power=float(used),
-        notes=("few_labels",) if n < _ENOUGH["numbers"] else (),
+        notes=("few_labels",) if n < _ENOUGH["z" if is_z else "numbers"] else (),
         reason=reason,
     )
 
