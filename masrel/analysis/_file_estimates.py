@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         CountedRatings,
         Metric,
     )
+    from masrel.analysis._judging import Judging
     from masrel.ratings import RatingsFile, RatingsPart
 
 _Ratings = TypeVar("_Ratings", bound="CodedRatings | CountedRatings")
@@ -119,6 +120,7 @@ class Questions(Estimating):
     reference: str | None = None
     unit: str | None = None
     clusters: tuple[str, ...] = ()  # that of every item of the part, if items have any
+    judging: "Judging | None" = None
 
     @property
     def takes_all(self) -> bool:
@@ -143,6 +145,9 @@ class Questions(Estimating):
 
     def record(self) -> dict[str, object]:
         """Return every option that decides a number."""
+        if self.judging is not None:
+            of_interval = {"target": self.target, "level": self.level}
+            return {**self.judging.record(), **of_interval}
         options = {"metric": self.metric, "convention": self.convention}
         return {
             "coefficients": self.names,
@@ -222,6 +227,8 @@ class Questions(Estimating):
 
     def between_raters(self, file: "RatingsFile") -> "Questions | None":
         """Return what is estimated between raters; None where that is nothing."""
+        if self.judging is not None:
+            return None
         if self.retest and all(len(part.raters) == 1 for part in file.parts):
             return None
         if not self.retest or self.coefficients is None:
@@ -283,6 +290,8 @@ _TEXTS = {
     "pair": "Difference: {pair}.",
     "reference": "{rater} is the reference, and in no other estimate between raters.",
     "least": "The {n} pairs that agree least; --json has {n_all}.",
+    "closer": "Closer: of human and judge to the other humans, item by item. Shares: "
+    "of items on which one is closer or as close.",
     "no_ends": "No intervals: --target items has them.",
     "shared_clusters": "Groups have clusters in common, which are left out of both at "
     "once.",
@@ -325,6 +334,17 @@ _EXPLANATIONS = {
     "confusion": "The columns: which share of these times the rater said so.",
     "confusion_ends": "Intervals are in --json: exact at the effective number of "
     "items.",
+    # judges
+    "advantage": "Advantage: how often the judge is as close to the other humans as a "
+    "human is, or closer; mean over humans. Not worse: humans better by less than ε.",
+    "worse": "p: of the human being better by ε or more; {tests}. Not worse: at "
+    "{level} % for all humans of a judge, by Benjamini and Yekutieli.",
+    "right": "Alone right: one of the two has the grade of {reference}, the other has "
+    "not. p: of the judge being right less often by {epsilon:g} or more.",
+    "judge_difference": "Difference: advantage of the first less that of the second on "
+    "the same items; {level} % CI and p by the jackknife; p (Holm): adjusted for all "
+    "pairs.",
+    "labels": "Labels: {labels}. {level} % CI.",
     # comparisons
     **{
         f"difference_of_{units}": "Difference: the first less the second. SE, {level} "

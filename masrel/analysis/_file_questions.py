@@ -71,10 +71,15 @@ _MANY = 8  # raters beyond which only the pairs that agree least are shown
 _SHOWN_PAIRS = 20  # of these pairs
 
 
+Question = Callable[[RatingsFile, Questions], Iterator[Answer]]
+"""What answers a question about a file."""
+
+
 def answers(
-    file: RatingsFile, questions: Questions
+    file: RatingsFile, questions: Questions, *more: Question
 ) -> tuple[RatingsFile, list[Answer]]:
     """Return the ratings without a reference, and the answers, agreement first."""
+    # more: questions of one command alone
     sessions = list(dict.fromkeys(str(part.session) for part in file.parts))
     if len(sessions) > 1 and not questions.retest:
         retest = ", --retest compares them" * (questions.command == "agree")
@@ -92,12 +97,12 @@ def answers(
     # Every note is in a result, and so below its table or in the JSON.
     with warnings.catch_warnings(action="ignore", category=MasrelWarning):
         # what does not fit these tables is said first: it says most
-        further = [
-            answer
+        usual = [
+            question
             for name, question in _QUESTIONS.items()
             if name == questions.command or getattr(questions, name, False)
-            for answer in question(file, questions)
         ]
+        further = [of for ask in (*usual, *more) for of in ask(file, questions)]
         first = [] if between is None else [agreement(others, between)]
     return others, first + further
 

@@ -32,6 +32,7 @@ GROUPS = {
         "compare": "Whether groups of ratings differ in agreement.",
         "diagnose": "Which rater, which pair and which category disagree.",
         "limits": "Limits of agreement of two raters who measured.",
+        "judge": "Whether a judge, such as a model, rates as well as the humans.",
         "latent": "Biases and noises of the raters in any file, items on one scale.",
         "plan": "How many items and raters a study needs, and what it can show.",
         "audit": "Whether any table gives the agreement that a paper prints.",

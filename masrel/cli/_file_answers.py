@@ -33,6 +33,7 @@ from masrel.estimates import IntervalMethod
 from masrel.ratings._findings import Reading
 
 if TYPE_CHECKING:
+    from masrel.analysis._file_questions import Question
     from masrel.ratings import RatingsFile
 
 Option = Callable[..., Any]
@@ -158,25 +159,34 @@ def file_command(
     *reading: Option,
     estimating: Sequence[str],
     questions: Sequence[Option] = (),
+    judging: Option | None = None,
+    of_judges: "Sequence[Question]" = (),
     figure: str,
     sentence: str | None = None,
     **fixed: Any,
 ) -> click.Command:
     """Return a command that answers questions about a file of ratings."""
     # reading, questions: options of the command's own; estimating: names of those
-    # that it shares with others; figure, sentence: helps of these forms; fixed:
-    # questions that are no options
+    # that it shares with others; judging: those about judges, of whom counts say
+    # nothing; of_judges: the functions that answer them; figure, sentence: helps of
+    # these forms; fixed: questions that are no options
     shared = [_ESTIMATING[name] for name in estimating]
+    of_counts = table_options if judging is None else []
 
     def command(
-        file: Path, reading: Reading, questions: Questions, output: OutputOptions
+        file: Path,
+        reading: Reading,
+        questions: Questions,
+        output: OutputOptions,
     ) -> None:
         questions = replace(questions, command=name, **fixed)
-        _show_answers(file, reading, questions, output)
+        _show_answers(file, reading, questions, output, *of_judges)
 
-    decorators = (
+    # those of judges become a part of the questions, and so stand before them
+    decorators: tuple[Option, ...] = (
         click.argument("file", type=InputFile(path_type=Path, allow_dash=True)),
-        grouped("reading", Reading, *reading_options, *table_options, *reading),
+        *([] if judging is None else [judging]),
+        grouped("reading", Reading, *reading_options, *of_counts, *reading),
         grouped("questions", Questions, *shared, *questions),
         *_WORDING,
         output_options(
@@ -196,19 +206,27 @@ def file_command(
 
 
 def _show_answers(
-    file: Path, reading: Reading, questions: Questions, output: OutputOptions
+    file: Path,
+    reading: Reading,
+    questions: Questions,
+    output: OutputOptions,
+    *of_judges: "Question",
 ) -> None:
     """Read a file, and print or write what is asked of it."""
     questions = replace(
         questions.checked(reading.clusters), reference=reading.reference
     )
-    has_figure = questions.target or questions.command in ("diagnose", "limits")
+    with_pictures = ("diagnose", "judge", "limits")  # that need no target
+    has_figure = questions.target or questions.command in with_pictures
     refuse(
         (
             output.figure is not None and not has_figure,
             "--figure: shows intervals, so it needs --target raters, items or both",
         )
     )
+    judging = questions.judging
+    if judging is not None:  # of a stream nobody knows which item is which
+        reading = replace(reading, stream=False)
     ratings = read_file(file, reading)
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers
@@ -217,14 +235,16 @@ def _show_answers(
     from masrel.tables._answer_tables import agreement_sentences
     from masrel.tables._first_screen import (
         first_screen,
+        judge_sentences,
         lacks_interval,
         left_out,
         reading_warnings,
     )
     from masrel.tables._tables import SIMULATED
 
-    others, answered = answers(ratings, questions)
-    is_sentence = output.sentence and answered[0].name == "agreement"
+    others, answered = answers(ratings, questions, *of_judges)
+    is_agreement = answered[0].name == "agreement"
+    is_sentence = output.sentence and (is_agreement or judging is not None)
     is_text = not (output.csv or output.latex or is_sentence)
     table, *more = first_screen(
         *(others, questions, answered),
@@ -235,13 +255,15 @@ def _show_answers(
     )
     notes = left_out(others, questions)
     warned = [f"warning: {text}" for text in reading_warnings(others, answered[0])]
-    sentences = partial(
+    sentences: Callable[[], str] = partial(
         agreement_sentences,
         answered[0],
         bands=questions.words,
         data=table.data,
         items=output.item_name,
     )
+    if judging is not None:
+        sentences = partial(judge_sentences, answered, output.item_name, table.data)
     columns = shutil.get_terminal_size((_WIDTH, 24)).columns
     write_output(
         output,
@@ -261,6 +283,11 @@ def _show_answers(
     if is_sentence:
         echo_notes((*table.read, *table.notes))
     echo_notes(warned)
+    gates = [row for of in answered if of.name == "gates" for row in of.shown or ()]
+    for row in gates:
+        click.echo(row["result"], err=True)
+    if not all(row["holds"] for row in gates):
+        click.get_current_context().exit(1)
     # what came through a pipe is gone
     is_there = questions.target is None and Path(others.read["file"]).is_file()
     if is_there and answered[0].name == "agreement" and lacks_interval(answered[0]):

@@ -33,6 +33,7 @@ _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 # Groups of options by the name of their argument, as --help heads them
 _HEADINGS = {
     "reading": "Reading FILE",
+    "judging": "Judges",
     "questions": "Estimating",
     "joints": "Joints",
     "stretch": "Motion",

@@ -206,10 +206,9 @@ def alternative_annotator_test(
     Raises
     ------
     ParameterError
-        If an option is unknown or outside its range.
+        If an option is unknown or outside its range, or no human has enough items.
     RatingsError
-        If grades do not fit the score, an item is there twice or has no cluster, or
-        no human has enough items.
+        If grades do not fit the score, or an item is there twice or has no cluster.
 
     Warns
     -----
@@ -462,7 +461,7 @@ def _enough(names: Sequence[str], n_items: Integers, min_items: int) -> _Bools:
     """Return whether humans have enough items; one has."""
     if not (n_items >= min_items).any():
         each = zip(names, n_items.tolist(), strict=True)
-        raise RatingsError(
+        raise ParameterError(
             f"min_items: needs a human with at least {min_items} items that another "
             "human and the judge have graded, got "
             + listed(f"{name} with {n}" for name, n in each)

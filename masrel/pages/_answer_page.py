@@ -16,7 +16,13 @@ from typing import TYPE_CHECKING
 from masrel.analysis._file_estimates import Answer, Questions
 from masrel.errors import MasrelWarning
 from masrel.pages._methods_text import latent_methods, methods
-from masrel.pages._pictures import PICTURES, PartSeen, forest_drawing, parts_seen
+from masrel.pages._pictures import (
+    PICTURES,
+    PartSeen,
+    forest_drawing,
+    judge_drawings,
+    parts_seen,
+)
 from masrel.pages._references import reference_texts
 from masrel.pages._sections import (
     Content,
@@ -60,6 +66,7 @@ _MOST_NAMED = 8  # raters whose grades stand one after the other
 _TITLES = {
     "compare": "Agreement of groups in",
     "diagnose": "Raters, pairs and grades in",
+    "judge": "Judges beside the humans in",
     "limits": "Limits of agreement of the raters in",
 }
 
@@ -148,9 +155,11 @@ def _result_section(
     blocks: list[Content] = [
         first,
         *([] if forest is None else [forest]),
+        *judge_drawings(answers, questions.level),
         *(Paragraph(text=text, absent=True) for text in notes),
     ]
-    if questions.command in _TITLES:  # which have an answer of their own
+    # which have an answer of their own
+    if questions.command in _TITLES and questions.judging is None:
         blocks = [*more, *blocks]
     else:
         blocks += more

@@ -119,6 +119,54 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
         ),
         _HOLM,
     ),
+    "judges": (
+        _Text(
+            "Whether {judges} may stand for a human was tested by the alternative "
+            "annotator test{}: how close the grades of judge and human are to those of "
+            "the other humans (score: {row[score]}), and whether the human is better "
+            "by ε = {row[epsilon]} or more.",
+            ("calderon2025",),
+        ),
+        _Text(
+            "The interval of the advantage is by a jackknife with Student's t on the "
+            "logit scale{}.",
+            ("efron1981",),
+            is_of_ends=True,
+        ),
+    ),
+    "humans": (
+        _Text(
+            "P-values of humans are {tests}, by Tango's statistic{}, and adjusted for "
+            "all humans of a judge.",
+            ("tango1998", "benjamini2001"),
+        ),
+    ),
+    "judge_reference": (
+        _Text(
+            "How often judge and human have the grade of the reference was compared by "
+            "Tango's test and interval{}, with ε = {row[epsilon]}.",
+            ("tango1998",),
+        ),
+    ),
+    "judge_differences": (
+        _Text(
+            "Advantages of judges on the same items were compared by a jackknife, with "
+            "Student's t and Holm's adjustment{}.",
+            ("efron1981", "holm1979"),
+        ),
+    ),
+    "rates": (
+        _Text(
+            "The rate of {row[grade]} is that of prediction-powered inference{}, from "
+            "{row[n_labels]} labels and {row[n_judged]} grades of a judge.",
+            ("angelopoulos2023",),
+        ),
+        _Text(
+            "Beside it stands the judge's rate corrected for its sensitivity and "
+            "specificity{}.",
+            ("rogan1978", "lang2014"),
+        ),
+    ),
     "equality": (_Text("{tests} tests whether all groups agree as well{}."),),
     "diagnosis_raters": (_WITHOUT,),
     "pairs": (_WITHOUT,),
@@ -153,7 +201,14 @@ def _of_tables(
         tests = list(dict.fromkeys(row["test"] for row in rows if "test" in row))
         keys = (*text.keys, *(_TESTS[test] for test in tests if test in _TESTS))
         used += keys
-        made[text.text.format(cited(keys), units=units, tests=joined(tests))] = None
+        judges = dict.fromkeys(of["judge"] for of in rows if "judge" in of)
+        named = {"units": units, "tests": joined(tests), "judges": joined([*judges])}
+        row = (
+            {}
+            if not rows
+            else next((of for of in rows if of.get("is_default")), rows[0])
+        )
+        made[text.text.format(cited(keys), **named, row=row)] = None
     yield from made
 
 

@@ -4,8 +4,9 @@ In: the ratings of a part of a file, and what was answered of them. Out: drawing
 captions, for a page or for axes.
 """
 
+import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
@@ -27,13 +28,20 @@ from masrel.agreement import (
 )
 from masrel.agreement._codes import item_counts
 from masrel.agreement.krippendorff import _metric_weights
-from masrel.analysis._file_estimates import Answer, Questions, on_grades, parts_of
+from masrel.analysis._file_estimates import (
+    Answer,
+    Questions,
+    Row,
+    on_grades,
+    parts_of,
+)
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
+from masrel.estimates import Interval
 from masrel.pages._sections import Drawing
-from masrel.plots._drawn_values import Drawn
+from masrel.plots._drawn_values import FOREST, Drawn, ForestRow
 from masrel.ratings import RatingsFile, RatingsPart
 from masrel.tables._answer_tables import agreement_forest, is_in_units
-from masrel.tables._tables import counted, number, percent
+from masrel.tables._tables import counted, interval_text, number, p_text, percent
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -184,11 +192,80 @@ _DRAWERS = {
 }
 
 
+def judge_drawings(answers: Sequence[Answer], level: float) -> Iterator[Drawing]:
+    """Return each human beside a judge, and rates; nothing where none was asked for."""
+    by_name = {answer.name: answer.shown or [] for answer in answers}
+    if rows := by_name.get("humans"):
+        epsilon = by_name["judges"][0]["epsilon"]
+        yield _judge_drawing(
+            "judges",
+            [_forest_row(of, "human", "difference", level) for of in rows],
+            "human's share less the judge's",
+            "How much more often than the judge each human is at least as close to "
+            f"the other humans, with {percent(level)} % confidence intervals (Tango): "
+            f"where ε = {epsilon:g} is excluded the judge is not worse.",
+            mark=(epsilon, f"ε = {epsilon:g}: worse by so much is too much"),
+        )
+    if rows := by_name.get("rates"):
+        grade = rows[0]["grade"]
+        yield _judge_drawing(
+            "rates",
+            [_forest_row(of, "name", "value", level) for of in rows],
+            f"share of items with the grade {grade}",
+            f"How often {grade} is right, by the judge alone, corrected for its errors "
+            f"in two ways, and by labels alone, with {percent(level)} % confidence "
+            "intervals.",
+        )
+
+
+def _forest_row(row: Row, label: str, key: str, level: float) -> ForestRow:
+    start = "" if key == "value" else f"{key}_"
+    numbers = (row.get(of) for of in (key, f"{start}low", f"{start}high"))
+    value, low, high = (math.nan if x is None else x for x in numbers)
+    ends = None
+    if math.isfinite(low) and math.isfinite(high):
+        ends = Interval(
+            low=low, high=high, level=level, kind="confidence", method="",
+            target="items",
+        )  # fmt: skip
+    text = number(value, 3)
+    return ForestRow(
+        label=row[label],
+        detail=f"p {p_text(row['p_value'])}" if "p_value" in row else "",
+        value=value if math.isfinite(value) else None,
+        interval=ends,
+        text=text if ends is None else f"{text} {interval_text(low, high)}",
+        has_zero="p_value" in row,
+        group=": ".join(filter(None, (row["group"], row["judge"]))),
+    )
+
+
+def _judge_drawing(
+    name: str,
+    rows: Sequence[ForestRow],
+    axis: str,
+    caption: str,
+    mark: tuple[float, str] | None = None,
+) -> Drawing:
+    ends = [row.interval.high for row in rows if row.interval] or [1.0]
+    right = 1.03 if mark is None else max(*ends, mark[0]) + 0.05
+    texts = "; ".join(f"{row.label} ({row.group}): {row.text}" for row in rows)
+    return Drawing(
+        name=name,
+        caption=caption,
+        alt=f"{caption} {texts}.",
+        content=Drawn(FOREST, (rows, axis, right, mark)),
+        stamp="",
+    )
+
+
 def main_picture(answers: Sequence[Answer], questions: Questions) -> Drawn:
     """Return the picture of an answer, of every part, else of the estimates."""
     for answer in answers:
         if answer.figure:
             return Drawn(_DRAWERS[answer.name], (answer.figure, answer.of))
+    for drawing in judge_drawings(answers, questions.level):
+        return drawing.content
     shown = answers[:1] if answers[0].name == "agreement" else answers
     rows = [row for answer in shown for row in answer.estimates]
     return agreement_forest(rows, questions.target or "items")

@@ -31,6 +31,7 @@ from masrel.plots._style import (
     DASHES,
     GREY,
     ORANGE,
+    VERMILLION,
     Picture,
     legend_below,
     shown,
@@ -61,6 +62,8 @@ _ZERO: dict[str, Any] = {
     "linestyle": DASHES,
     "zorder": 0.9,  # behind every ridge
 }
+
+_MARK: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.2, "zorder": 0.9}
 
 _Floats = NDArray[np.float64]
 
@@ -143,8 +146,14 @@ def forest(
     return shown(forest_picture(rows, "agreement (1 is perfect)"), ax)
 
 
-def forest_picture(rows: Sequence[ForestRow], axis_label: str) -> Picture:
+def forest_picture(
+    rows: Sequence[ForestRow],
+    axis_label: str,
+    right: float = _RIGHT,
+    mark: tuple[float, str] | None = None,
+) -> Picture:
     """Return estimates with their intervals as a picture."""
+    # right: where the axis ends; mark: a value that has a line, and its name
     how: dict[str, Any] = {"break_on_hyphens": False}
     rows = [
         replace(
@@ -156,14 +165,18 @@ def forest_picture(rows: Sequence[ForestRow], axis_label: str) -> Picture:
     ]
     ridges = [_ridge(row.interval) for row in rows]
     handles = _legend_handles(rows, ridges)
+    if mark is not None:
+        handles.append(Line2D([], [], label=mark[1], **_MARK))
 
     def draw(axes: Axes) -> None:
         values = [row.value for row in rows if row.value is not None]
         ends = [row.interval.low for row in rows if row.interval is not None]
         lowest = [_lowest(ridge) for ridge in ridges if ridge]
         left = max(min([0.0, *values, *ends, *lowest]), _LEFT) - 0.05
-        axes.set_xlim(left, _RIGHT)
+        axes.set_xlim(left, right)
         axes.set_ylim(_draw_rows(axes, rows, ridges) + 0.05, 0.0)
+        if mark is not None:
+            axes.axvline(mark[0], **_MARK)
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         axes.grid(axis="x")
@@ -220,7 +233,7 @@ def _draw_rows(
 
 
 def _draw_row(axes: Axes, row: ForestRow, ridge: _Ridge, y: float) -> None:
-    left, interval = axes.get_xlim()[0], row.interval
+    (left, right), interval = axes.get_xlim(), row.interval
     above, below = _beside(row)
     if ridge:
         base, top = y - 0.3 * _LINE, y - 0.3 * _LINE - 0.95 * _RIDGE
@@ -232,7 +245,7 @@ def _draw_row(axes: Axes, row: ForestRow, ridge: _Ridge, y: float) -> None:
             arrow = {"marker": "<", "markersize": 7, "color": look["color"]}
             axes.plot([left], [y], clip_on=False, **arrow)
     if row.value is not None:
-        inside = min(max(row.value, left), _RIGHT)
+        inside = min(max(row.value, left), right)
         marker = "o" if inside == row.value else "<" if row.value < left else ">"
         axes.plot([inside], [y], clip_on=False, **{**_DOT, "marker": marker})
     _at_left(axes, y, row.label, lifted=36.0 * below)

@@ -263,11 +263,13 @@ def _facts(names: Sequence[str], wrong: set[int], named: set[int]) -> dict[str, 
     ignored = f"--ignore{few(out)} leaves such columns aside, " * bool(
         rest and few(out)
     )
+    is_gold = len(out) == 1 and called_gold(out[0])
+    held = f"; as --reference{few(out)} judge and diagnose hold the others against it"
     return {
         "columns": listed(out, _SHOWN),
         "why": "name" if wrong <= named else _APART,
         "advice": f"{ignored}--raters{few(rest) * (len(rest) > 1)} names those that "
-        "rate",
+        f"rate{held * is_gold}",
     }
 
 
@@ -324,15 +326,28 @@ def _called_otherwise(sheet: Sheet, layout: Layout) -> set[int]:
 def _is_no_rater(sheet: Sheet, place: int, lower: set[str]) -> bool:
     # lower: the names of all columns in lower case
     name, cells = sheet.header[place], {*sheet.columns[place].texts}
-    parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
-    words = set(re.findall(r"[^\W\d_]+|\d+", parts))
+    words = _words(name)
     is_flag = bool(words & _FLAGS) and len(cells - {*USUAL_MISSING}) <= 2
-    is_sum = bool(words & _SUMS) and words <= _SUMS | _BESIDE
+    is_sum = _is_sum(words)
     is_sum &= not _is_of_series(name, sheet.header)
     # Kim=Lee, mean of Kim and Lee
     of_two = len((words & lower) - {name.lower()}) > 1
     is_other = bool(words & _SURE or _OTHERS.fullmatch(name))
     return is_other or is_flag or is_sum or of_two
+
+
+def called_gold(name: str) -> bool:
+    """Return whether a name is no person's, but that of gold or a majority's vote."""
+    return _is_sum(_words(name)) or bool(_words(name) & _SURE)
+
+
+def _words(name: str) -> set[str]:
+    parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
+    return set(re.findall(r"[^\W\d_]+|\d+", parts))
+
+
+def _is_sum(words: set[str]) -> bool:
+    return bool(words & _SUMS) and words <= _SUMS | _BESIDE
 
 
 def _alone(codes: Codes, scale: Scale, freq: Codes) -> tuple[set[int], set[int]]:

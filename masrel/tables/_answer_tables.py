@@ -45,6 +45,12 @@ _CAPTIONS = {
     "diagnosis_pairs": "{of} of every two raters",
     "diagnosis_categories": "Agreement on each category",
     "diagnosis_confusion": "What each rater said where {of} said the first",
+    "judges": "May the judge stand for a human?",
+    "humans": "The judge beside each human, both held against the other humans",
+    "judge_reference": "The judge beside the human, both held against the reference",
+    "judge_differences": "Differences of advantage between judges",
+    "rates": "How often {of} is right",
+    "gates": "Gates",
     "differences": "Differences of agreement between groups",
     "equality": "Equality of agreement in all groups",
 }
@@ -57,6 +63,7 @@ _ENDS = (
     Column(key="low", heading="Low", digits=3),
     Column(key="high", heading="High", digits=3),
 )
+_JUDGE = Column(key="judge", heading="Judge", align="left")
 _COEFFICIENT = (
     Column(key="coefficient", heading="Coefficient", where="csv"),
     Column(key="title", heading="Coefficient", align="left"),
@@ -109,6 +116,69 @@ _COLUMNS: dict[str, tuple[Column, ...]] = {
         Column(key="rater", heading="Rater", align="left"),
         Column(key="of", heading="{of} said", align="left"),
         Column(key="n", heading="Times"),
+    ),
+    "judges": (
+        _JUDGE,
+        Column(key="n_humans", heading="Humans"),
+        Column(key="n_rejected", heading="Not worse"),
+        Column(key="winning_rate", heading="Winning rate", digits=3),
+        Column(key="passes", heading="Passes", align="left"),
+        Column(key="advantage", heading="Advantage", digits=3),
+        *_ENDS,
+        _ITEMS,
+    ),
+    "humans": (
+        _JUDGE,
+        Column(key="human", heading="Human", align="left"),
+        _ITEMS,
+        Column(key="b", heading="Human closer"),
+        Column(key="c", heading="Judge closer"),
+        Column(key="ties", heading="Ties"),
+        Column(key="human_share", heading="Human's share", digits=3),
+        Column(key="judge_share", heading="Judge's share", digits=3),
+        Column(key="difference", heading="Difference", digits=3, where="csv"),
+        Column(key="difference_low", heading="Low", where="csv"),
+        Column(key="difference_high", heading="High", where="csv"),
+        Column(key="test", heading="Test", where="csv"),
+        _P,
+        Column(key="p_adjusted", heading="p (adjusted)", where="csv"),
+        Column(key="not_worse", heading="Not worse", align="left"),
+    ),
+    "judge_reference": (
+        _JUDGE,
+        Column(key="human", heading="Human", align="left"),
+        Column(key="judge_right", heading="Judge alone right"),
+        Column(key="human_right", heading="Human alone right"),
+        Column(key="difference", heading="Difference", digits=3),
+        *_ENDS,
+        _P,
+        Column(key="not_worse", heading="Not worse", align="left"),
+        _ITEMS,
+    ),
+    "judge_differences": (
+        Column(key="first", heading="First", align="left"),
+        Column(key="second", heading="Second", align="left"),
+        Column(key="value", heading="Difference", digits=3),
+        _ERROR,
+        *_ENDS,
+        _P,
+        Column(key="p_holm", heading="p (Holm)", is_p=True),
+        _ITEMS,
+    ),
+    "rates": (
+        _JUDGE,
+        Column(key="method", heading="Method", where="csv"),
+        Column(key="name", heading="Method", align="left", where="page"),
+        Column(key="value", heading="Rate", digits=3),
+        *_ENDS,
+        Column(key="n_judged", heading="Judged"),
+        Column(key="n_labels", heading="Labels"),
+        Column(key="assumed", heading="Assumes", align="left", where="page"),
+    ),
+    "gates": (
+        Column(key="gate", heading="Gate", align="left"),
+        Column(key="number", heading="Number", digits=3),
+        Column(key="verdict", heading="Holds", align="left"),
     ),
     "differences": (
         *_COEFFICIENT,
@@ -273,6 +343,8 @@ def _columns(
     hidden = {"median"} - known
     if len({row.get("group") for row in shown}) == 1:  # nothing to adjust p for
         hidden.add("p_holm")
+    if len({row.get("judge") for row in shown}) == 1 and len(shown) > 1:
+        hidden.add("judge")
     for column in _COLUMNS.get(answer.name, _OF_ESTIMATES):
         if "reference" in column.key and "with_reference" not in known:
             continue

@@ -1,6 +1,6 @@
 """What is shown first: what was read of a file, the tables of answers, and notes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,17 @@ from masrel.analysis._file_estimates import Answer, Questions, Row
 from masrel.estimates import _population
 from masrel.ratings import Finding, RatingsFile
 from masrel.tables._answer_tables import Detail, answer_table
-from masrel.tables._tables import Table, counted, number, p_text, percent, significant
+from masrel.tables._tables import (
+    SIMULATED,
+    Table,
+    capital,
+    counted,
+    joined,
+    number,
+    p_text,
+    percent,
+    significant,
+)
 
 _SHOWN = 12  # raters that are named
 
@@ -49,11 +59,32 @@ def first_screen(
     ]
     if is_text:
         at, text = result_sentence(answered, items)
-        tables[at] = replace(tables[at], notes=(text, *tables[at].notes))
+        notes = (*text.splitlines(), *tables[at].notes)
+        tables[at] = replace(tables[at], notes=notes)
         tables[0] = replace(tables[0], caption="")
     first, *more = tables
-    read, notes = what_was_read(ratings, items, detail), left_out(ratings, questions)
-    return [replace(first, read=tuple(read), notes=(*first.notes, *notes)), *more]
+    read = (*what_was_read(ratings, items, detail), *_roles(ratings, questions))
+    notes = (*first.notes, *left_out(ratings, questions))
+    return [replace(first, read=read, notes=notes), *more]
+
+
+def _roles(file: RatingsFile, questions: Questions) -> Iterator[str]:
+    """Return who of the raters are judges and humans, if some are judges."""
+    if (judging := questions.judging) is None:
+        return
+    others = (*judging.judges, questions.reference)
+    humans = [name for name in file.read["raters"] if name not in others]
+    roles = {
+        "judge": judging.judges,
+        "human": judging.humans or humans,
+        "reference": [] if questions.reference is None else [questions.reference],
+    }
+    texts = (
+        f"{role}{'s' * (len(names) > 1)} {joined(names)}"
+        for role, names in roles.items()
+        if names
+    )
+    yield f"{capital('; '.join(texts))}."
 
 
 def what_was_read(
@@ -181,6 +212,8 @@ _RESULTS = {
 
 def result_sentence(answered: Sequence[Answer], items: str) -> tuple[int, str]:
     """Return the place of the answer that says most, and what it says."""
+    if verdicts := "\n".join(_verdicts(answered, items)):
+        return 0, verdicts
     for at in reversed(range(len(answered))):
         name, rows, of = answered[at].name, answered[at].shown or (), answered[at].of
         key, text = _RESULTS.get(name, ("", ""))
@@ -197,6 +230,63 @@ def result_sentence(answered: Sequence[Answer], items: str) -> tuple[int, str]:
             }
             return at, text.format(**words)
     return 0, _agreement(answered[0], items)
+
+
+# Answers about judges to what is said of each row
+_VERDICTS = {
+    "judges": "{judge}{group} {may}: that it is worse by less than ε = {epsilon}, if "
+    "at all, is shown for {n_rejected} of {n_humans} humans, and {n_needed}.{no_proof} "
+    "On {advantage} % of {items} its grade is as close to those of the "
+    "other humans as a human's is, or closer{ends}.",
+    "judge_reference": "{judge}{group} {may}: it has the grade of {reference} on "
+    "{difference} % of {items} {more} than {human}{ends}, and {margin} % fewer would "
+    "do.{no_proof}",
+    "rates": "{grade} is right for {value} % of {items}{group} by {title}{ends}; "
+    "{judge} alone says {naive} %.",
+}
+_IN_PERCENT = ("advantage", "difference", "value", "naive", "low", "high", "margin")
+
+
+def _verdicts(answered: Sequence[Answer], items: str) -> Iterator[str]:
+    """Return what is shown of every judge, and what is not, in a sentence or two."""
+    for answer in answered:
+        for row in answer.shown or () if answer.name in _VERDICTS else ():
+            if row.get("is_default") is False:
+                continue
+            passes = row.get("is_passed")
+            of = {**row, "margin": row.get("epsilon")}
+            of |= {"difference": abs(row.get("difference") or 0.0)}
+            of |= {
+                key: number(100.0 * share, 1)
+                for key in _IN_PERCENT
+                if isinstance(share := of.get(key), float)
+            }
+            ends = ""
+            if row.get("low") is not None and row.get("reason") is None:
+                to = row.get("population", "other items").replace("items", items)
+                ends = f" ({percent(row['level'])} % confidence interval "
+                ends += f"{of['low']} to {of['high']} %, for {to} like these)"
+            yield _VERDICTS[answer.name].format(
+                **{**of, "group": f" ({row['group']})" if row.get("group") else ""},
+                may="may stand for a human"
+                if passes
+                else "is not shown to be able to stand for a human",
+                n_needed=_needed(-(-row.get("n_humans", 0) // 2), passes=passes),
+                no_proof="" if passes else " That is no proof that it is worse.",
+                more="fewer" if (row.get("difference") or 0.0) < 0.0 else "more",
+                items=items,
+                ends=ends,
+            )
+
+
+def _needed(n: int, *, passes: bool | None) -> str:
+    return f"{n} {'is' if n == 1 else 'are'} {'enough' if passes else 'needed'}"
+
+
+def judge_sentences(answered: Sequence[Answer], items: str, data: str) -> str:
+    """Return what is shown of every judge, one a line."""
+    stamp = f"{SIMULATED}. " if data == "simulated" else ""
+    return "\n".join(f"{stamp}{text}" for text in _verdicts(answered, items))
 
 
 def _says_most(row: Row) -> tuple[float, bool]:

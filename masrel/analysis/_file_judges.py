@@ -1,0 +1,471 @@
+"""Judges of a file beside its humans: whether they may stand for one, and rates.
+
+In: a `RatingsFile` some of whose raters are judges. Out: rows of judges, of humans, and
+of rates corrected for a judge.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from masrel._input import listed, refuse
+from masrel.agreement import code_ratings
+from masrel.analysis._file_estimates import (
+    Answer,
+    Questions,
+    Row,
+    check_order,
+    heads_of,
+    note,
+    part_names,
+    parts_of,
+    placed,
+)
+from masrel.analysis._gates import Gate, GateResult, read_gate
+from masrel.analysis._judging import Judging
+from masrel.errors import ParameterError
+from masrel.estimates import _population, as_document
+from masrel.judges import (
+    advantage,
+    advantage_differences,
+    alternative_annotator_test,
+    rate_estimates,
+    reference_difference,
+    score_test,
+)
+from masrel.ratings import RatingsFile
+from masrel.ratings._doubts import called_gold
+
+_Grades = dict[str, Any]  # by item
+
+
+_MARGIN = (
+    "--epsilon, --annotators: needed one of them: ε is how much worse than a human a "
+    "judge may be, as it costs less; --annotators expert takes 0.2, skilled 0.15 and "
+    "crowd 0.1"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Part:
+    """The grades of one part of a file by rater and item, and who is who."""
+
+    file: RatingsFile
+    questions: Questions
+    judging: Judging
+    margin: float
+    judges: tuple[str, ...]
+    humans: tuple[str, ...]
+    texts: Mapping[str, _Grades]  # grades as they are called
+    values: Mapping[str, _Grades]  # and their values
+    clusters: Mapping[str, str] | None
+
+
+_Made = Iterator[tuple[str, Row, Row]]  # name of an answer, a row, and cells beside it
+
+
+def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    """Return what is told of the judges of every part of the ratings."""
+    judging = questions.judging
+    if judging is None:
+        raise ParameterError("judging: needed judges")
+    has_question = judging.margin is not None or judging.rate is not None
+    refuse((not has_question, _MARGIN))
+    makers: list[Callable[[_Part], _Made]] = []
+    if judging.margin is not None:
+        makers += [_beside_humans, _differences]
+    if judging.rate is not None:
+        makers.append(_rates)
+    rows: dict[str, list[tuple[Row, Row]]] = {}
+    for part, group, keys in _parts(file, questions, judging):
+        for make in makers:
+            with placed(file.read["file"], group):
+                for name, row, cells in make(part):
+                    both = {**keys, **row}, {**keys, **row, "group": group, **cells}
+                    rows.setdefault(name, []).append(both)
+    answered = [
+        Answer(
+            name=name,
+            rows=[row for row, _ in several],
+            shown=[cells for _, cells in several],
+            heads=heads_of(*part_names(file, file.parts[0])),
+            notes=tuple(_notes(name, [row for row, _ in several], questions)),
+            of=judging.rate or "",
+        )
+        for name, several in rows.items()
+    ]
+    yield from answered
+    if judging.require:
+        yield _gates(answered, judging.require)
+
+
+def _parts(
+    file: RatingsFile, questions: Questions, judging: Judging
+) -> Iterator[tuple[_Part, str, Row]]:
+    # with what each is called
+    scale = file.scale
+    texts, values = (
+        np.array([*of, None], object) for of in (scale.grades, scale.values)
+    )
+    for part, group, keys in parts_of(file):
+        judges, humans = _roles(judging, questions.reference, part.raters)
+        with placed(file.read["file"], group):
+            codes = code_ratings(part.ratings).codes.T  # (n_raters, n_items)
+        items = part.items or tuple(map(str, range(1, codes.shape[1] + 1)))
+        of_texts, of_values = (
+            {
+                rater: dict(zip(items, column, strict=True))
+                for rater, column in zip(part.raters, labels[codes], strict=True)
+            }
+            for labels in (texts, values)
+        )
+        clusters = (
+            dict(zip(items, part.clusters, strict=True)) if part.clusters else None
+        )
+        made = _Part(
+            file=file,
+            questions=questions,
+            judging=judging,
+            margin=judging.margin or 0.0,
+            judges=judges,
+            humans=humans,
+            texts=of_texts,
+            values=of_values,
+            clusters=clusters,
+        )
+        yield made, group, keys
+
+
+def _roles(
+    judging: Judging, reference: str | None, raters: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the judges and the humans, or refuse who is neither."""
+    named = {
+        "--judge": judging.judges,
+        "--humans": tuple(judging.humans or ()),
+        "--reference": () if reference is None else (reference,),
+    }
+    for option, names in named.items():
+        for name in names:
+            near = get_close_matches(name, raters, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            known = f"needed one of {listed(raters)}, got {name!r}{hint}"
+            refuse((name not in raters, f"{option}: {known}"))
+    several = [name for names in named.values() for name in names]
+    twice = [name for name in dict.fromkeys(several) if several.count(name) > 1]
+    options = ", ".join(named)
+    refuse((twice, f"{options}: needed others each, got {listed(twice)} twice"))
+    if named["--humans"]:
+        return judging.judges, named["--humans"]
+    humans = tuple(name for name in raters if name not in several)
+    for name in humans:
+        refuse(
+            (
+                called_gold(name),
+                f"--humans: {name!r} reads like a gold standard, which is no human: "
+                f"--reference {name} holds it apart; if it is one, --humans names all",
+            )
+        )
+    return judging.judges, humans
+
+
+# ---- judges beside humans ----
+
+_YES = {True: "yes", False: "no"}
+_OF_TEST = (
+    *("winning_rate", "advantage", "is_passed", "n_items", "n_clusters", "epsilon"),
+    *("score", "test", "min_items", "thresholds"),
+)
+
+
+def _beside_humans(part: _Part) -> _Made:
+    """Give each judge and each human beside it; one human against a reference."""
+    reference, judging = part.questions.reference, part.judging
+    if len(part.humans) == 1 and reference is not None:
+        yield from _against_reference(part, reference)
+        return
+    refuse(
+        (
+            len(part.humans) < 2,
+            "--judge: needs two humans, each of whom is held against the others with "
+            f"and without the judge, got {listed(part.humans) or 'none'}; one is "
+            "enough with --reference",
+        )
+    )
+    how, level = _how(part), part.questions.level
+    for judge in part.judges:
+        result = alternative_annotator_test(
+            {name: part.values[name] for name in part.humans},
+            part.values[judge],
+            epsilon=part.margin,
+            test=judging.test,
+            level=1.0 - level,
+            **how,
+        )
+        left_out = [f"{name} ({n} items)" for name, n in result.left_out]
+        row = {
+            "judge": judge,
+            "n_humans": len(result.humans),
+            "n_rejected": sum(human.is_rejected for human in result.humans),
+            **{key: getattr(result, key) for key in _OF_TEST},
+            "left_out": [name for name, _ in result.left_out],
+        }
+        texts = [f"left out: {', '.join(left_out)}"] if left_out else []
+        yield "judges", *_with_interval(part, judge, row, texts)
+        for human in result.humans:
+            row = {
+                "judge": judge,
+                "human": human.name,
+                **{of.name: getattr(human, of.name) for of in fields(human)[1:]},
+                "ties": human.n_items - human.b - human.c,
+                "difference": human.human_share - human.judge_share,
+            }
+            if part.clusters is None:  # else it would be too short
+                ends = score_test(human.b, human.c, human.n_items, level=level)
+                row |= {"difference_low": ends.low, "difference_high": ends.high}
+            not_worse = _YES[human.is_rejected]
+            title = f"{human.name}, {judge}"
+            yield "humans", row, {"title": title, "not_worse": not_worse}
+
+
+def _how(part: _Part) -> dict[str, Any]:
+    """Return how grades are compared, as functions of judges take it."""
+    judging, score = part.judging, part.judging.score
+    if score != "accuracy":
+        check_order(part.file, f"--score {score}")
+    is_name = score in ("accuracy", "neg_rmse")
+    return {
+        "score": score if is_name else (score, part.file.scale.values),
+        "min_items": judging.min_items,
+        "clusters": part.clusters,
+    }
+
+
+def _with_interval(
+    part: _Part, judge: str, row: Row, texts: list[str]
+) -> tuple[Row, Row]:
+    """Return a judge's row with the interval of the advantage, and cells beside it."""
+    passes = _YES[row["is_passed"]]
+    cells: Row = {"title": judge, "texts": texts, "passes": passes}
+    target = part.questions.target
+    if target is None:
+        return {**row, "standard_error": None, "interval": None}, cells
+    humans = {name: part.values[name] for name in part.humans}
+    estimate = advantage(
+        humans,
+        part.values[judge],
+        target=target,
+        level=part.questions.level,
+        **_how(part),
+    )
+    interval: Any = estimate.interval
+    row = {
+        **row,
+        "standard_error": estimate.standard_error,
+        "interval": as_document(interval),
+    }
+    why = [] if interval.reason is None else [f"no interval: {interval.reason}"]
+    ends = {key: getattr(interval, key) for key in ("low", "high", "level")}
+    cells |= {
+        **ends,
+        "population": _population(interval),
+        "interval_texts": [*why, *interval.notes],
+    }
+    return row, cells
+
+
+def _differences(part: _Part) -> _Made:
+    """Give how much more advantage a judge has than another on the same items."""
+    questions = part.questions
+    if len(part.judges) < 2 or len(part.humans) < 2 or questions.target is None:
+        return
+    humans, judges = (
+        {name: part.values[name] for name in names}
+        for names in (part.humans, part.judges)
+    )
+    for pair in advantage_differences(
+        humans, judges, target=questions.target, level=questions.level, **_how(part)
+    ):
+        row = {of.name: getattr(pair, of.name) for of in fields(pair)}
+        row["interval"] = as_document(pair.interval)
+        yield "judge_differences", row, {"group": f"{pair.first} and {pair.second}"}
+
+
+def _against_reference(part: _Part, reference: str) -> _Made:
+    """Give how much more often than the one human each judge is right."""
+    (human,) = part.humans
+    for judge in part.judges:
+        test = reference_difference(
+            *(part.texts[name] for name in (human, judge, reference)),
+            epsilon=part.margin,
+            level=part.questions.level,
+        )
+        row: Row = {
+            "judge": judge,
+            "human": human,
+            "reference": reference,
+            "n_items": test.n,
+            "judge_right": test.b,
+            "human_right": test.c,
+            "difference": test.value,
+            "low": test.low,
+            "high": test.high,
+            "level": test.level,
+            "epsilon": part.margin,
+            "p_value": test.p_greater,
+            "is_passed": test.p_greater <= 1.0 - test.level,
+            "reason": test.reason,
+        }
+        cells = {"title": judge, "not_worse": _YES[row["is_passed"]]}
+        yield "judge_reference", row, cells
+
+
+# ---- rates ----
+
+_METHODS = {
+    "naive": "Judge alone",
+    "rogan_gladen": "Rogan-Gladen",
+    "prediction_powered": "PPI++",
+    "labels_alone": "Labels alone",
+}
+_ASSUMED = {
+    "judge_is_right": "the judge makes no errors",
+    "errors_carry_over": "it errs elsewhere as often as on labelled items",
+    "labels_are_random": "labelled items are drawn at random",
+}
+_RATE_NOTES = {
+    "few_labels": "few labels: the interval may cover less than it says",
+    "whole_range": "the interval is all of 0 to 1: nothing was learnt",
+}
+
+
+def _rates(part: _Part) -> _Made:
+    """Give how often a grade is right, in four ways for each judge."""
+    grade, reference = part.judging.rate, part.questions.reference
+    labels = part.humans if reference is None else (reference,)
+    refuse(
+        (
+            len(labels) != 1,
+            "--rate: needs --reference with the rater who has the labels, or one "
+            f"human, got {listed(labels) or 'none'}",
+        ),
+        (
+            grade not in part.file.scale.grades,
+            f"--rate: needed one of {listed(part.file.scale.grades)}, got {grade!r}",
+        ),
+    )
+    for judge in part.judges:
+        result = rate_estimates(
+            part.texts[labels[0]],
+            part.texts[judge],
+            grade=grade,
+            level=part.questions.level,
+        )
+        for of in result.rows:
+            is_default = of.method == result.default
+            row = {
+                "judge": judge,
+                "labels": labels[0],
+                "grade": grade,
+                **{field.name: getattr(of, field.name) for field in fields(of)},
+                "is_default": is_default,
+                "sensitivity": result.sensitivity[0],
+                "specificity": result.specificity[0],
+            }
+            title = _METHODS[of.method]
+            yield (
+                "rates",
+                row,
+                {
+                    "title": f"{title}, {judge}" if len(part.judges) > 1 else title,
+                    "name": f"{title} (default)" if is_default else title,
+                    "assumed": _ASSUMED[of.assumption],
+                    "texts": [
+                        *([f"undefined: {of.reason}"] if of.reason else []),
+                        *(_RATE_NOTES[key] for key in of.notes),
+                    ],
+                    "naive": result.rows[0].value,
+                },
+            )
+
+
+# ---- notes and gates ----
+
+_TESTS = {
+    "exact": "exact and unconditional",
+    "score": "Tango's score test",
+    "t": "Student's t, which rejects too often where few items differ",
+    "clusters": "Tango's score test with the design effect of clusters",
+}
+
+
+def _notes(name: str, rows: Sequence[Row], questions: Questions) -> Iterator[str]:
+    """Return what stands below the table of an answer."""
+    level = questions.level
+    if name == "judges":
+        yield note("advantage")
+        if questions.target is None:
+            yield note("no_ends")
+    elif name == "humans":
+        tests = ", ".join(dict.fromkeys(_TESTS[row["test"]] for row in rows))
+        yield note("closer")
+        yield note("worse", tests=tests, level=1.0 - level)
+    elif name == "judge_reference":
+        of = {key: rows[0][key] for key in ("reference", "epsilon")}
+        yield note("right", **of, level=level)
+    elif name == "judge_differences":
+        yield note("judge_difference", level=level)
+    elif name == "rates":
+        yield note("labels", labels=rows[0]["labels"], level=level)
+
+
+# Answers to what a gate on their rows may be about
+_GATED = {
+    "judges": ("winning_rate", "advantage", "low", "high"),
+    "judge_reference": ("difference", "low", "high"),
+    "rates": ("value", "low", "high"),
+}
+
+
+def _gates(answers: Sequence[Answer], require: Sequence[str]) -> Answer:
+    """Hold numbers of judges and rates against gates such as ``rate.low >= 0.8``."""
+    rows: dict[str, tuple[tuple[str, ...], Row]] = {}
+    for answer in answers:
+        numbers, is_rate = _GATED.get(answer.name, ()), answer.name == "rates"
+        for row in answer.shown or () if numbers else ():
+            if row.get("is_default", True):
+                start = f"{row['group']}: " if row["group"] else ""
+                rows[f"{start}{row['judge']}{'.rate' * is_rate}"] = numbers, row
+                if is_rate:  # of the first judge
+                    rows.setdefault(f"{start}rate", (numbers, row))
+    numbers_of = {name: numbers for name, (numbers, _) in rows.items()}
+    about = {"what": "a judge or rate", "example": "gpt-4o.winning_rate >= 0.5"}
+    gates = [
+        read_gate(text, numbers_of, where="--require", **about) for text in require
+    ]
+    results = [_held(gate, rows[gate.estimate][1]) for gate in gates]
+    return Answer(
+        name="gates",
+        rows=[result.record() for result in results],
+        shown=[
+            {
+                **result.record(),
+                "title": str(result.gate),
+                "holds": result.holds,
+                "verdict": _YES[result.holds],
+                "result": str(result),
+            }
+            for result in results
+        ],
+    )
+
+
+def _held(gate: Gate, row: Row) -> GateResult:
+    number = row.get(gate.number)
+    if number is None:
+        return gate.hold(math.nan, "no interval was asked for: --target items")
+    return gate.hold(number, row.get("reason"))
