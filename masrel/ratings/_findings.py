@@ -347,7 +347,8 @@ _TEXTS = {
     "no rows": "needed rows of ratings below the names, got none",
     "library": "reading it needs {library}: pip install 'masrel[{extra}]'",
     "damaged": "is damaged, or no {suffix} file ({error})",
-    "members": "needed one file in it, got {n}: {members}",
+    "members": "needed one file in it, got {n}: {members}; --from says which tool "
+    "exports several",
     "unpacked": "is more than {most} bytes when unpacked: {do}",
     "kind": "needed text, got a file of the kind {suffix}",
     "html": "is HTML, as web programs call .xls, too: open it in a spreadsheet program "

@@ -9,6 +9,7 @@ import io
 import json
 import re
 import shlex
+import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -79,6 +80,19 @@ def label_studio() -> str:
             for item, both in enumerate([("xu", "xv"), ("yu", "xu")])
         ]
     )
+
+
+def samples() -> bytes:
+    """Two items that two models are tested by, a folder each."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as archive:
+        for model, values in (("a", (1, 1)), ("b", (0, 1))):
+            rows = [
+                {"doc_id": k, "filter": "none", "metrics": ["acc"], "acc": acc}
+                for k, acc in enumerate(values)
+            ]
+            archive.writestr(f"{model}/s.jsonl", "\n".join(map(json.dumps, rows)))
+    return data.getvalue()
 
 
 def workbook() -> bytes:
@@ -251,6 +265,12 @@ TABLE: dict[str, Asked] = {
                 code="fields", tries={"--grade a": "xx yx", "--grade b": "uv uu"}
             )
         },
+    ),
+    "an archive of several files": Asked(
+        code="members",
+        name="r.zip",
+        text=samples,
+        tries={"--from lm-eval": "10 11"},
     ),
     "an export of one of two tools": Asked(
         code="sources",
