@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         dawid_skene_intervals,
         effective_number,
     )
+    from masrel.judges.power import JudgePlan, judge_plan
     from masrel.judges.rates import (
         RateEstimate,
         RateEstimates,
@@ -50,6 +51,7 @@ __all__ = [
     "Grades",
     "HumanBesideJudge",
     "JudgeDifference",
+    "JudgePlan",
     "PairedTest",
     "RateEstimate",
     "RateEstimates",
@@ -63,6 +65,7 @@ __all__ = [
     "dawid_skene",
     "dawid_skene_intervals",
     "effective_number",
+    "judge_plan",
     "label_allocation",
     "labels_needed",
     "prediction_powered_mean",
@@ -80,6 +83,7 @@ _HOMES = {
     "Grades": "annotators",
     "HumanBesideJudge": "annotators",
     "JudgeDifference": "annotators",
+    "JudgePlan": "power",
     "PairedTest": "_paired",
     "RateEstimate": "rates",
     "RateEstimates": "rates",
@@ -93,6 +97,7 @@ _HOMES = {
     "dawid_skene": "latent_classes",
     "dawid_skene_intervals": "latent_classes",
     "effective_number": "latent_classes",
+    "judge_plan": "power",
     "label_allocation": "rates",
     "labels_needed": "rates",
     "prediction_powered_mean": "rates",

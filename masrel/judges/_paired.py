@@ -5,6 +5,7 @@ with its interval, and p-values that are exact, or Student's.
 """
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +28,7 @@ _PER_SD = 2.0  # places of the nuisance to a standard error of its estimate
 _PEAKS = 3  # highest maxima among these that are looked at more closely
 _CLOSER = np.linspace(-1.0, 1.0, 9)  # places around one of them
 _JOINED = 2.0  # items that differ in clusters wholly alike
+_LOWEST_Z = -9.0  # where nothing is rejected
 _SMALLEST = 1e-17  # probability of a count that adds nothing
 
 
@@ -240,13 +242,42 @@ _P_VALUES: dict[PairedTest, Callable[[int, int, int, float], float]] = {
 }
 
 
+def rejected(n: int, delta: float, bound: float, test: PairedTest) -> Integers:
+    """Return, for each c, the largest b with a p-value of at most a bound; -1 for none.
+
+    Of the exact test it is a region of the score test with another bound of z.
+    """
+    # -> (n + 1,)
+    from scipy.special import ndtri
+
+    if test == "score":
+        return lower_region(float(ndtri(bound)), n, delta)
+    if test == "t":
+        p_of = partial(_t_p, n=n, delta=delta)
+        counts = (
+            bisect_right(range(n - c + 1), bound, key=partial(p_of, c=c))
+            for c in range(n + 1)
+        )
+        return np.fromiter(counts, dtype=np.int64) - 1
+    low, high = _LOWEST_Z, 0.0
+    inner, outer = (lower_region(z, n, delta) for z in (low, high))
+    while high - low > _TIED and (outer - inner).sum() > 1:
+        middle = 0.5 * (low + high)
+        region = lower_region(middle, n, delta)
+        if maximum(partial(region_share, region, delta), n, delta) <= bound:
+            low, inner = middle, region
+        else:
+            high, outer = middle, region
+    return inner
+
+
 def p_less_of_clusters(d: Integers, clusters: Integers, delta: float) -> float:
     """Return the p-value of items that may be alike in a cluster, by Tango's score.
 
-    Counts are divided by their design effect [2]_, and z has Student's distribution
-    with as many degrees of freedom as clusters less 1. Few items that differ tell next
-    to nothing of how alike clusters are: two more, of clusters wholly alike, are
-    joined to them.
+    Counts are divided by their design effect (Rao and Scott), and z has Student's
+    distribution with as many degrees of freedom as clusters less 1. Few items that
+    differ tell next to nothing of how alike clusters are: two more, of clusters wholly
+    alike, are joined to them.
     """
     # d (n_items,): 1, -1 or 0; clusters (n_items,): codes
     from scipy.special import stdtr

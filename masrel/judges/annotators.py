@@ -24,7 +24,7 @@ from masrel.agreement import (
     holm,
 )
 from masrel.agreement._engine import NO_SPREAD, Floats, Integers, check_level, undefined
-from masrel.agreement._labels import check_categories, is_missing, label_codes
+from masrel.agreement._labels import check_categories, label_codes
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._question import student_t, warn_small
@@ -56,12 +56,12 @@ ScoreName = Literal["accuracy", "neg_rmse"]
 Score = ScoreName | tuple[WeightsLike, Sequence[Label]]
 """A name, or weights of agreement and the declared categories that they are of."""
 
-_Clusters = Mapping[Hashable, Hashable] | None
 _Bools = NDArray[np.bool_]
 
 _EXACT_UP_TO = 2500  # items, of which an exact p-value takes some 50 ms
 _FEW_CLUSTERS = 20
 _ROUNDING = 1e-12  # share of a sum of weights, or an error, that is none
+_NO_CLUSTERS = "0/0: there is one cluster, or no difference in any"
 _NO_ITEM = "without one of what is left out a human has no item"
 _AT_THE_END = "it is at the end of its scale, where nothing shows what others would be"
 
@@ -168,7 +168,7 @@ def alternative_annotator_test(
     test: PairedTest | Literal["auto"] = "auto",
     min_items: int = 30,
     level: float = 0.05,
-    clusters: _Clusters = None,
+    clusters: Grades | None = None,
 ) -> AlternativeAnnotatorTest:
     """Test whether a judge may stand for a human, each human held against the others.
 
@@ -242,6 +242,9 @@ def alternative_annotator_test(
     .. [3] Benjamini, Y., Yekutieli, D. (2001). The control of the false discovery rate
        in multiple testing under dependency. Annals of Statistics, 29(4), 1165-1188.
        https://doi.org/10.1214/aos/1013699998
+    .. [4] Rao, J. N. K., Scott, A. J. (1992). A simple method for the analysis of
+       clustered binary data. Biometrics, 48(2), 577-585.
+       https://doi.org/10.2307/2532311
 
     Examples
     --------
@@ -319,7 +322,10 @@ def _human(
         if test == "auto":
             way = "exact" if n <= _EXACT_UP_TO else "score"
         p = p_less(b, c, n, epsilon, way)
-    reason = undefined(f"the p-value of {name}", NO_CHANGE) if math.isnan(p) else None
+    reason = None
+    if math.isnan(p):
+        why = NO_CHANGE if units is None else _NO_CLUSTERS
+        reason = undefined(f"the p-value of {name}", why)
     return {
         "name": name,
         "n_items": n,
@@ -371,27 +377,20 @@ class _Graded:
 
     def without(self, j: int) -> "_Graded":
         """Return the same without one human, whom nobody is held against then."""
-        rated = np.delete(self.rated, j, axis=1)
-        return replace(
-            self,
-            names=self.names[:j] + self.names[j + 1 :],
-            humans=np.delete(self.humans, j, axis=1),
-            rated=rated & (rated.sum(axis=1, keepdims=True) >= 2),
-            is_tested=np.delete(self.is_tested, j),
-        )
+        rated = self.rated & (np.arange(len(self.names)) != j)
+        return replace(self, rated=rated & (rated.sum(axis=1, keepdims=True) >= 2))
 
-    def cluster_codes(self, clusters: _Clusters) -> Integers:
+    def cluster_codes(self, clusters: Grades | None) -> Integers:
         """Return the cluster of every item as numbers from 0; without any, the item."""
         # -> (n_items,)
         if clusters is None:
             return np.arange(len(self.items))
         of = _by_item(clusters, "clusters")
-        labels = [of.get(item) for item in self.items]
-        for item, label in zip(self.items, labels, strict=True):
-            if is_missing(label):
-                raise RatingsError(f"clusters: item {item!r} needs one, got nothing")
-        codes = {label: code for code, label in enumerate(dict.fromkeys(labels))}
-        return np.array([codes[label] for label in labels])
+        codes, _ = label_codes([list(map(of.get, self.items))], None)
+        if (codes < 0).any():
+            item = self.items[int(codes[0].argmin())]
+            raise RatingsError(f"clusters: item {item!r} needs one, got nothing")
+        return np.asarray(codes[0], dtype=np.int64)
 
 
 def _graded(
@@ -428,6 +427,14 @@ def _graded(
             f"{len(items)} is, such as {shown(next(iter(by_judge[0]), None))}"
         )
     rated = is_there[does_count, :n]
+    n_items = rated.sum(axis=0)
+    if not (n_items >= min_items).any():
+        each = zip(by_human, n_items.tolist(), strict=True)
+        raise ParameterError(
+            f"min_items: needs a human with at least {min_items} items that another "
+            "human and the judge have graded, got "
+            + listed(f"{name} with {n}" for name, n in each)
+        )
     values, nearness = _values(title, codes[does_count], categories, weights)
     return _Graded(
         names=list(by_human),
@@ -436,7 +443,7 @@ def _graded(
         rated=rated,
         judges=values[:, n:],
         nearness=nearness,
-        is_tested=_enough(list(by_human), rated.sum(axis=0), min_items),
+        is_tested=n_items >= min_items,
         n_categories=len(categories),
         score=title,
     )
@@ -455,18 +462,6 @@ def _by_item(grades: Any, place: str) -> dict[Any, Any]:
         twice = next(name for i, name in enumerate(names) if name in names[:i])
         raise RatingsError(f"{place}: needs each name once, got {twice!r} twice")
     return by_item
-
-
-def _enough(names: Sequence[str], n_items: Integers, min_items: int) -> _Bools:
-    """Return whether humans have enough items; one has."""
-    if not (n_items >= min_items).any():
-        each = zip(names, n_items.tolist(), strict=True)
-        raise ParameterError(
-            f"min_items: needs a human with at least {min_items} items that another "
-            "human and the judge have graded, got "
-            + listed(f"{name} with {n}" for name, n in each)
-        )
-    return np.asarray(n_items >= min_items)
 
 
 def _checked_score(
@@ -522,7 +517,7 @@ def advantage(
     score: Score = "accuracy",
     min_items: int = 30,
     level: float = 0.95,
-    clusters: _Clusters = None,
+    clusters: Grades | None = None,
 ) -> Estimate:
     """Estimate how often a judge is at least as near to humans as one of them is.
 
@@ -667,7 +662,7 @@ def advantage_differences(
     score: Score = "accuracy",
     min_items: int = 30,
     level: float = 0.95,
-    clusters: _Clusters = None,
+    clusters: Grades | None = None,
 ) -> tuple[JudgeDifference, ...]:
     """Compare the advantages of several judges on the items that all have graded.
 
@@ -797,7 +792,7 @@ def _leave_out(
     score: Score,
     min_items: int,
     level: float,
-    clusters: _Clusters,
+    clusters: Grades | None,
 ) -> _LeftOut:
     """Check a question about advantages, and leave out what it asks of."""
     check_option("target", target, get_args(Target))

@@ -144,9 +144,9 @@ def test_the_exact_p_value_is_a_plain_sum_where_that_is_largest(
     top = (1.0 - delta) / 2.0
     sums = [
         sum(trinomial(i, j, n, q + delta, q) for i, j in extreme)
-        for q in np.linspace(0.0, top, 2001)
+        for q in np.linspace(0.0, top, 401)
     ]
-    assert p_less(b, c, n, delta, "exact") == pytest.approx(max(sums), rel=1e-5)
+    assert p_less(b, c, n, delta, "exact") == pytest.approx(max(sums), rel=1e-4)
 
 
 @given(counts(), st.sampled_from([0.0, 0.02, 0.1, 0.2, 0.6]))
@@ -155,7 +155,7 @@ def test_no_peak_of_the_nuisance_is_missed(
 ) -> None:
     b, c, n = of
     z = 0.0 if delta == b + c == 0 else score_test(b, c, n, delta=delta).statistic
-    q = (1.0 - delta) / 2.0 * np.sin(np.linspace(0.0, math.pi / 2.0, 1500)) ** 2
+    q = (1.0 - delta) / 2.0 * np.sin(np.linspace(0.0, math.pi / 2.0, 500)) ** 2
     shares = region_share(lower_region(z, n, delta), delta, q)
     exact = p_less(b, c, n, delta, "exact")
     assert exact >= shares.max() * (1.0 - 1e-6) - 1e-14
