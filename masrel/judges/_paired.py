@@ -29,6 +29,7 @@ _PEAKS = 3  # highest maxima among these that are looked at more closely
 _CLOSER = np.linspace(-1.0, 1.0, 9)  # places around one of them
 _JOINED = 2.0  # items that differ in clusters wholly alike
 _LOWEST_Z = -9.0  # where nothing is rejected
+_AT_ONCE = 1 << 22  # probabilities
 _SMALLEST = 1e-17  # probability of a count that adds nothing
 
 
@@ -341,7 +342,9 @@ def maximum(share: Callable[[Floats], Floats], n: int, delta: float) -> float:
     angles = np.linspace(0.0, 0.5 * math.pi, n_steps + 1)
 
     def at(angles: Floats) -> Floats:
-        return share(0.5 * (1.0 - delta) * np.sin(angles) ** 2)
+        q = 0.5 * (1.0 - delta) * np.sin(angles) ** 2
+        parts = np.array_split(q, 1 + q.size * n // _AT_ONCE)
+        return np.concatenate([share(part) for part in parts])
 
     values = at(angles)
     padded = np.concatenate([[-1.0], values, [-1.0]])

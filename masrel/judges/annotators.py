@@ -39,7 +39,7 @@ from masrel.judges._paired import (
 )
 
 EPSILONS: Mapping[str, float] = {"expert": 0.2, "skilled": 0.15, "crowd": 0.1}
-"""How much less often a human may win than the judge loses, by who the humans are."""
+"""By how much a human may be better, by who the humans are (Calderon et al. 2025)."""
 
 
 class Grades(Protocol):

@@ -13,7 +13,8 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.special import stdtr
+from scipy.special import expit, logit, stdtr
+from scipy.stats import t
 from statsmodels.stats.multitest import multipletests
 
 from masrel.agreement import benjamini_yekutieli
@@ -329,8 +330,19 @@ def test_the_error_is_the_jackknifes_by_leaving_out_one_after_the_other(
     )
     assert estimate.value == pytest.approx(plain_advantage(humans, judge))
     assert estimate.standard_error == pytest.approx(math.sqrt(variance), rel=1e-9)
-    assert estimate.interval is not None
-    assert 0.0 < estimate.interval.low < estimate.value < estimate.interval.high < 1.0
+    # symmetric on the logit, by t of the human with the fewest units, or of humans
+    counted = set().union(*units)
+    fewest = min(
+        sum(any(i in of and i in counted for i in unit) for unit in units)
+        for of in humans.values()
+    )
+    df = (4 if target in {"raters", "both"} else fewest - 1) + 0.0
+    slope = estimate.value * (1.0 - estimate.value)
+    half = t.ppf(0.975, df) * estimate.standard_error / slope
+    ends = expit(logit(estimate.value) + np.array([-half, half]))
+    interval = estimate.interval
+    assert interval is not None
+    assert (interval.low, interval.high) == pytest.approx(tuple(ends), rel=1e-9)
 
 
 def test_an_advantage_of_1_has_the_interval_of_no_event() -> None:
