@@ -18,7 +18,7 @@ from masrel.plots._style import (
     PAGE,
     VERMILLION,
     inches_from,
-    short_name,
+    short_names,
 )
 
 LINE = 0.15
@@ -82,14 +82,13 @@ def inches_of(text: str) -> float:
 
 def room_of(names: Sequence[str]) -> float:
     """Return the inches of names at the left of rows, or standing above columns."""
-    return 0.3 + max(inches_of(short_name(name)) for name in names)
+    return 0.3 + max(map(inches_of, short_names(names)))
 
 
 def name_rows(axes: Axes, names: Sequence[str], cell: float) -> None:
     """Name rows that are so many inches high, as many as have room."""
     every = math.ceil(LINE / cell)
-    shown = [short_name(name) for name in names[::every]]
-    axes.set_yticks(range(0, len(names), every), shown)
+    axes.set_yticks(range(0, len(names), every), short_names(names)[::every])
     axes.tick_params(axis="y", length=0)
 
 
@@ -97,7 +96,7 @@ def name_columns(
     axes: Axes, names: Sequence[str], cell: float, places: Sequence[float]
 ) -> None:
     """Name columns that are so many inches wide, above them, upright where narrow."""
-    names = [short_name(name) for name in names]
+    names = short_names(names)
     is_narrow = max(map(inches_of, names)) + 0.06 > cell
     every = math.ceil(LINE / cell) if is_narrow else 1
     axes.set_xticks(places[::every], names[::every], rotation=90 * is_narrow)

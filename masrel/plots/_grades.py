@@ -43,6 +43,7 @@ from masrel.plots._style import (
     colour_bar,
     legend_below,
     short_name,
+    short_names,
     shown,
 )
 from masrel.tables._tables import counted, number, percent
@@ -181,12 +182,13 @@ def counts_picture(
     label: str = "share of the row",
 ) -> Picture:
     """Return how often each grade comes in each row, shaded by shares of the rows."""
-    # counts, framed (n_rows, q); names of the rows together, and of the columns
+    # counts, framed (n_rows, q); names of the rows together, and of the columns; label
+    # of the bar that explains the shades, without which rows are low
     more = int(len(grades) <= _MAX_COUNTED)  # totals, where counts are written
     m, n = len(rows) + more, len(grades) + more
     heads, totals = [*grades, "all"][:n], [*rows, "all"][:m]
     cell = min(0.42, _ACROSS / n)
-    across, height = max(cell * n, 2.8), min(cell, _DOWN / m)
+    across, height = max(cell * n, 2.8), min(cell if label else 0.28, _DOWN / m)
     of_row, of_column = counts.sum(axis=1, keepdims=True), counts.sum(axis=0)
     table = np.block([[counts, of_row], [of_column, counts.sum()]])
     letters = np.where(table > 0, table.astype(str), "")[: m * more]
@@ -196,14 +198,15 @@ def counts_picture(
         shares = counts / np.maximum(of_row, 1)
         drawn = cells(axes, shares, letters, framed=framed, **look)
         axes.set(xlim=(-0.5, n - 0.5), ylim=(m - 0.5, -0.5))
-        axes.set(ylabel=short_name(names[0]), xlabel=short_name(names[1]))
+        axes.set(ylabel=short_names(names)[0], xlabel=short_names(names)[1])
         name_rows(axes, totals, height)
         name_columns(axes, heads, across / n, range(n))
         axes.xaxis.set_label_position("top")
-        colour_bar(axes, drawn, label)
+        if label:
+            colour_bar(axes, drawn, label)
 
     room = room_of(totals) + across, room_of(heads) + height * m
-    return Picture(0.2 + room[0], 1.2 + room[1], draw)
+    return Picture(0.2 + room[0], (1.2 if label else 0.4) + room[1], draw)
 
 
 def _part(counts: _Integers, *steps: int) -> str:
@@ -359,7 +362,6 @@ def categories_picture(
     counts: _Integers,
     grades: Sequence[str],
     level: float,
-    label: str = "share of a grade's ratings that meet\nthe same of another rater",
 ) -> Picture:
     """Return the agreement on each grade as a dot with its interval."""
     n, cell = len(grades), min(0.3, _DOWN / len(grades))
@@ -378,7 +380,10 @@ def categories_picture(
         axes.hlines(range(n), low, high, **line)
         axes.plot(values, range(n), markersize=4.5, **dot, clip_on=False)
         axes.grid(axis="x")
-        rows_of_shares(axes, grades, texts, cell, label)
+        rows_of_shares(
+            *(axes, grades, texts, cell),
+            "share of a grade's ratings that meet\nthe same of another rater",
+        )
         legend_below(axes, marks if np.isfinite(low).any() else (), ncols=2)
 
     return Picture(room_of(grades) + 5.2, 1.1 + cell * n, draw)
@@ -555,15 +560,21 @@ def _legend(
     texts: Sequence[str], colours: _Floats, across: float
 ) -> tuple[float, Callable[[Axes], None]]:
     """Return the inches of what explains colours, and what draws it."""
-    ncols = max(1, int(across / (0.45 + max(map(inches_of, texts)))))
-    pairs = zip(texts, colours, strict=True)
-    patches = [Patch(color=colour, label=text) for text, colour in pairs]
+    most = max(1, int(across / (0.45 + max(map(inches_of, texts)))))
+    n_rows = -(-len(texts) // most)
+    ncols = -(-len(texts) // n_rows)  # so that rows are about equal
+    patches = [
+        Patch(color=colour, label=text)
+        for text, colour in zip(texts, colours, strict=True)
+    ]
     # row by row, where a legend goes down its columns
     marks = [patch for place in range(ncols) for patch in patches[place::ncols]]
-    how: dict[str, Any] = {
-        "handlelength": 1.2,
-        "handleheight": 1.0,
-        "columnspacing": 1.2,
-    }
-    height = 0.05 + 0.175 * -(-len(texts) // ncols)
-    return height, partial(legend_below, handles=marks, ncols=ncols, **how)
+    explain = partial(
+        legend_below,
+        handles=marks,
+        ncols=ncols,
+        handlelength=1.2,
+        handleheight=1.0,
+        columnspacing=1.2,
+    )
+    return 0.05 + 0.175 * n_rows, explain

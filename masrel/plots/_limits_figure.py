@@ -24,7 +24,7 @@ from masrel.plots._style import (
     SEQUENTIAL,
     Picture,
     legend_below,
-    short_name,
+    short_names,
     shown,
 )
 from masrel.tables._tables import counted, fixed_or_significant, percent
@@ -122,7 +122,7 @@ def _draw(
             at[:, 0], at[:, 1], s=area * freq, **_DOT, linewidths=0.0, zorder=3.0
         )
     of_unit = f" ({unit})" if unit else ""
-    first, second = map(short_name, raters)
+    first, second = short_names(raters)
     space = "\n" if len(first) + len(second) > _MAX_IN_A_LINE else " "
     axes.set_xlabel(f"mean of {first}{space}and {second}{of_unit}")
     axes.set_ylabel(f"{first} −{space}{second}{of_unit}")

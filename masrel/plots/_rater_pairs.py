@@ -24,7 +24,7 @@ from masrel.plots._style import (
     colour_bar,
     inches_from,
     legend_below,
-    short_name,
+    short_names,
     shown,
 )
 from masrel.tables._tables import number, percent
@@ -91,14 +91,14 @@ def pairs_picture(result: "Diagnosis", title: str) -> Picture:
     cell = next(inches for most, inches in _CELLS if n <= most)
     letters = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
     order = np.argsort(-result.mean_values, kind="stable")
-    raters = [short_name(result.raters[place]) for place in order]
-    others = [] if result.reference is None else [short_name(result.reference)]
-    room = max(map(len, [*raters, *others])) * _LETTER * letters / 9.0 + 0.35
-    width = cell * (n + len(others))
+    others = () if result.reference is None else (result.reference,)
+    names = short_names([*(result.raters[place] for place in order), *others])
+    room = max(map(len, names)) * _LETTER * letters / 9.0 + 0.35
+    width = cell * len(names)
     has_changes = bool(np.isfinite(result.changes).any())
 
     def draw(axes: Axes) -> None:
-        _heatmap(axes, _pairs(result, order), raters, others)
+        _heatmap(axes, _pairs(result, order), names)
         axes.tick_params(length=0, labelsize=letters)
         extend = "min" if (_pairs(result, order) < 0.0).any() else "neither"
         colour_bar(axes, axes.images[0], f"{title} of pairs", extend=extend)
@@ -128,15 +128,13 @@ def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> _Floats:
     return np.column_stack([values, result.reference_values[order]])
 
 
-def _heatmap(
-    axes: Axes, values: _Floats, raters: Sequence[str], others: Sequence[str]
-) -> None:
+def _heatmap(axes: Axes, values: _Floats, names: Sequence[str]) -> None:
     n_rows, n_columns = values.shape
     letters = [[_short(value) for value in row] for row in values.tolist()]
     shown = np.array(letters if n_rows <= _MAX_NUMBERS else [[]])
     cells(axes, values, shown, cmap=_COLOURS, vmin=0.0, vmax=1.0)
-    axes.set_xticks(range(n_columns), [*raters, *others], rotation=90)
-    axes.set_yticks(range(n_rows), raters)
+    axes.set_xticks(range(n_columns), names, rotation=90)
+    axes.set_yticks(range(n_rows), names[:n_rows])
     axes.xaxis.tick_top()
     if n_columns > n_rows:
         axes.axvline(n_rows - 0.5, color=PAGE, linewidth=6.0)

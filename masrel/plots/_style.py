@@ -118,6 +118,15 @@ def short_name(name: str, most: int = _MAX_LETTERS) -> str:
     return f"{name[:half]}…{name[-half:]}"
 
 
+def short_names(names: Sequence[str]) -> list[str]:
+    """Return names that have room at an axis, and differ where the whole ones do."""
+    n_names, most = len({*names}), _MAX_LETTERS
+    # where both ends of two are the same, more of all is kept
+    while len({short_name(name, most) for name in names}) < n_names:
+        most += 2
+    return [short_name(name, most) for name in names]
+
+
 # without what says how figures are shown, not how they look
 _DEFAULTS = {
     key: value

@@ -368,9 +368,14 @@ def _category_rows(
         ]
     keys = ("counts", "values", "low", "high")
     columns = [arrays[f"category_{key}"].tolist() for key in keys]
-    for grade, n, value, *ends, kappa in zip(grades, *columns, kappas, strict=True):
+    # only models that were given a grade say how well raters agree on it
+    of_grade = (codes[:, :, None] == np.arange(len(grades))).any(axis=1).sum(axis=0)
+    columns.append(of_grade.tolist())
+    for grade, n, value, *ends, n_models, kappa in zip(
+        grades, *columns, kappas, strict=True
+    ):
         if n:
-            shown = few(ends, model=len(entry.models)) or interval_text(*ends)
+            shown = few(ends, model=n_models) or interval_text(*ends)
             yield grade, n, value, shown, *ends, kappa
         else:
             yield grade, n, *[None] * 5

@@ -182,8 +182,8 @@ def conduct_section(material: Material) -> Iterator[Content]:
         yield Paragraph(text=text)
     if left_out := "; ".join(_left_out(material, conduct)):
         yield Paragraph(
-            text=f"Left out, as nobody asked for it: {left_out}. masrel report "
-            "--include NAME shows what is in parentheses."
+            text=f"Left out: {left_out}. masrel report shows each with --include and "
+            "the word in parentheses."
         )
 
 
@@ -261,7 +261,9 @@ def _flow_figure(material: Material, conduct: StudyConduct) -> Drawing:
     shown = "; ".join(", ".join((label, *others)) for label, others in steps)
     return Drawing(
         name="rater_flow",
-        caption="Flow of the raters. Who began and did not complete is analysed, too.",
+        caption="Flow of the raters."
+        + " Raters who did not complete are analysed, too."
+        * (not {*flow["analysed"]} <= {*complete}),
         alt=f"Flow of the raters. {shown}.",
         content=Drawn(FIGURES + "_study_figures:flow_figure", (steps,)),
         stamp=material.stamp,

@@ -15,7 +15,6 @@ from masrel.lab._study_files import once
 from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._descriptions import FEWEST_RATERS
 from masrel.lab.report._material import (
-    FIGURES,
     INTERVAL,
     MANY_RATERS,
     SUPPLEMENT,
@@ -151,7 +150,7 @@ _INTENDED = Column(key="intended_grade", heading="Intended", align="center")
 
 
 def _grid_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
-    protocol, scale = material.protocol, material.ratings.scale
+    scale = material.ratings.scale
     raters = [Column(key=name, heading=name, align="center") for name in grid.raters]
     yield Table(
         name=f"grades_{grid.session}",
@@ -161,12 +160,7 @@ def _grid_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
         notes=tuple(grid.notes),
         data=material.data,
     )
-    # as far as a protocol tells
-    is_ordered = (
-        "order" in (protocol.report.sections or ())
-        or any(line.weights != "identity" for line in protocol.analysis.estimates)
-        or any(grade[0].isdecimal() for grade in scale.grades)
-    )
+    is_ordered = _is_ordered(material)
     caption = [
         f"Grades of session {grid.session}.",
         *["Darker: a higher grade."] * is_ordered,
@@ -183,6 +177,16 @@ def _grid_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
         alt=f"Grid of grades. {grid.words}.",
         content=Drawn("masrel.plots._grades:items_picture", pictured),
         stamp=material.stamp,
+    )
+
+
+def _is_ordered(material: Material) -> bool:
+    # whether the scale has an order, as far as a protocol tells
+    protocol = material.protocol
+    return (
+        "order" in (protocol.report.sections or ())
+        or any(line.weights != "identity" for line in protocol.analysis.estimates)
+        or any(grade[0].isdecimal() for grade in material.ratings.scale.grades)
     )
 
 
@@ -341,8 +345,6 @@ def confusion_section(material: Material) -> Iterator[Content]:
     caption = f"Grades given for each intended grade, session {session}"
     shares = _shares(by_rater, [grades.index(aim) for aim in intended], level)
     n_raters = by_rater.shape[1]
-    drawn = shares.copy()
-    drawn[1:, [bool(few(ends, rater=n_raters)) for ends in shares[1:].T]] = np.nan
     counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
     framed = np.array([[grade == aim for grade in grades] for aim in intended])
     yield Paragraph(
@@ -354,17 +356,15 @@ def confusion_section(material: Material) -> Iterator[Content]:
         + ", ".join(f"{n} of {g}" for g, n in zip(grades, of_aim, strict=True) if n)
         for aim, of_aim in zip(intended, counts.tolist(), strict=True)
     ]
-    pictured = (intended, counts, framed, drawn, grades, level)
+    pictured = (counts, intended, grades, framed, ("intended grade", "grade given"))
     yield Drawing(
         name="confusion",
         caption=(
-            f"{caption}. Above: how often; darker is a larger "
-            "part of the row, and the intended grade is framed. Below: the part as "
-            f"intended, with its {percent(level)} % confidence interval for other "
-            "raters like these."
+            f"{caption}. Darker is a larger part of the row; the intended grade is "
+            "framed."
         ),
         alt=f"Counts of grades given. {'; '.join(texts)}.",
-        content=Drawn(FIGURES + "_study_figures:aim_pictures", pictured),
+        content=Drawn("masrel.plots._grades:counts_picture", (*pictured, "")),
         stamp=material.stamp,
     )
     yield SUPPLEMENT
@@ -390,11 +390,12 @@ def confusion_section(material: Material) -> Iterator[Content]:
             )
         ),
         notes=(
-            "Rows: the grade a model was built for; columns: the grades given. Where "
-            "the scale has an order, those left of the intended one are too low and "
-            "those right of it too high. Interval: "
-            f"{percent(level)} % confidence interval of "
-            "the percentage, for other raters like these on these models.",
+            "Rows: the grade a model was built for; columns: the grades given. "
+            + "Those left of the intended one are too low and those right of it too "
+            "high. "
+            * _is_ordered(material)
+            + f"Interval: {percent(level)} % confidence interval of the percentage, "
+            "for other raters like these on these models.",
         ),
         data=material.data,
     )

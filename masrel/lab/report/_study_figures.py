@@ -10,12 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from masrel.lab.analysis import Speed, Speeds
 from masrel.lab.report._material import MANY_RATERS
 from masrel.lab.schedule.sheets import _OrderBalance
-from masrel.plots._grades import categories_picture, counts_picture
+from masrel.plots._grades import counts_picture
 from masrel.plots._style import (
     BLACK,
     BLUE,
@@ -24,7 +23,7 @@ from masrel.plots._style import (
     ORANGE,
     VERMILLION,
     Picture,
-    short_name,
+    short_names,
 )
 from masrel.tables._tables import counted, percent
 
@@ -32,25 +31,6 @@ _UPRIGHT_LETTERS = 7  # of a model's name that fits below a column
 _MODELS_IN_A_ROW = 8  # more go into further rows: a page is no wider
 _SPREADS = ((0.9, 1.4), (0.5, 6.0))  # share of the speeds, width of its line
 _SESSION_LOOKS = (("o", BLUE), ("s", ORANGE), ("^", VERMILLION), ("v", GREY))
-
-
-def aim_pictures(
-    aims: Sequence[str],
-    counts: NDArray[np.int64],
-    framed: NDArray[np.bool_],
-    shares: NDArray[np.float64],
-    grades: Sequence[str],
-    level: float,
-) -> list[tuple[str, Picture]]:
-    """Return grades by intended ones, and below them the part as intended."""
-    names = "intended grade", "grade given"
-    label = "part of the grades that is the intended one"
-    value, low, high = shares
-    shown = value, low, high, counts.sum(axis=1), aims, level
-    return [
-        ("", counts_picture(counts, aims, grades, framed, names)),
-        ("", categories_picture(*shown, label)),
-    ]
 
 
 def speed_figure(speeds: Speeds, raters: Sequence[str], slowest: float) -> Figure:
@@ -65,8 +45,7 @@ def speed_figure(speeds: Speeds, raters: Sequence[str], slowest: float) -> Figur
     figure = Figure(figsize=(width, 0.6 + 2.6 * len(starts)))
     rows = figure.subplots(len(starts), 1, sharey=True, squeeze=False)[:, 0]
     for axes, start in zip(rows, starts, strict=True):
-        shown = models[start : start + in_a_row]
-        _speed_row(axes, speeds, raters, shown, sessions)
+        _speed_row(axes, speeds, raters, models[start : start + in_a_row], sessions)
         _mark_slowest(axes, slowest)
     rows[0].set_ylim(bottom=0)
     label = "haptic model"
@@ -114,7 +93,7 @@ def _speed_row(
         values = [of for of in speeds.values if (of.session, of.model) == key]
         look = _SESSION_LOOKS[place % len(_SESSION_LOOKS)]
         _draw_speeds(axes, values, raters, (middle, 0.9 * width), look)
-    names = [short_name(model) for model in models]
+    names = short_names(models)
     is_long = max(map(len, names)) > _UPRIGHT_LETTERS
     slanted: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
     axes.set_xticks(range(len(models)), names, **slanted if is_long else {})

@@ -229,7 +229,7 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     ),
     "a grade that nobody gave": (
         study(plan(), sections=("categories",)), table_v(),
-        ["| 0 | 0 | – | – | – |", "| 1 | 9 | 0.698 | 4 models are too few | 0.580 |"],
+        ["| 0 | 0 | – | – | – |", "| 1 | 9 | 0.698 | 2 models are too few | 0.580 |"],
     ),
     "the word that agree has for it, whose interval ends in 'fair'": (
         study(plan(interval="posterior", target="items"), sections=("agreement",)),
