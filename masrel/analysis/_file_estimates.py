@@ -290,6 +290,7 @@ _TEXTS = {
     "pair": "Difference: {pair}.",
     "reference": "{rater} is the reference, and in no other estimate between raters.",
     "least": "The {n} pairs that agree least; --json has {n_all}.",
+    "roles": "Judges: {judges}. Humans: {humans}.",
     "closer": "Closer: of human and judge to the other humans, item by item. Shares: "
     "of items on which one is closer or as close.",
     "no_ends": "No intervals: --target items has them.",

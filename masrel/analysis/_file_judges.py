@@ -81,7 +81,10 @@ def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]
     if judging.rate is not None:
         makers.append(_rates)
     rows: dict[str, list[tuple[Row, Row]]] = {}
+    who: dict[str, None] = {}
     for part, group, keys in _parts(file, questions, judging):
+        roles = {"judges": listed(part.judges), "humans": listed(part.humans) or "none"}
+        who[note("roles", **roles)] = None
         for make in makers:
             with placed(file.read["file"], group):
                 for name, row, cells in make(part):
@@ -93,10 +96,13 @@ def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]
             rows=[row for row, _ in several],
             shown=[cells for _, cells in several],
             heads=heads_of(*part_names(file, file.parts[0])),
-            notes=tuple(_notes(name, [row for row, _ in several], questions)),
+            notes=(
+                *(who if at == 0 else ()),
+                *_notes(name, [row for row, _ in several], questions),
+            ),
             of=judging.rate or "",
         )
-        for name, several in rows.items()
+        for at, (name, several) in enumerate(rows.items())
     ]
     yield from answered
     if judging.require:
@@ -112,7 +118,8 @@ def _parts(
         np.array([*of, None], object) for of in (scale.grades, scale.values)
     )
     for part, group, keys in parts_of(file):
-        judges, humans = _roles(judging, questions.reference, part.raters)
+        kinds = file.read.get("kinds", {})
+        judges, humans = _roles(judging, questions.reference, part.raters, kinds)
         with placed(file.read["file"], group):
             codes = code_ratings(part.ratings).codes.T  # (n_raters, n_items)
         items = part.items or tuple(map(str, range(1, codes.shape[1] + 1)))
@@ -141,11 +148,16 @@ def _parts(
 
 
 def _roles(
-    judging: Judging, reference: str | None, raters: Sequence[str]
+    judging: Judging,
+    reference: str | None,
+    raters: Sequence[str],
+    kinds: Mapping[str, str],
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the judges and the humans, or refuse who is neither."""
+    # kinds: what raters are, where the file says it
+    models = tuple(name for name in raters if kinds.get(name) == "model")
     named = {
-        "--judge": judging.judges,
+        "--judge": judging.judges or models,
         "--humans": tuple(judging.humans or ()),
         "--reference": () if reference is None else (reference,),
     }
@@ -159,8 +171,11 @@ def _roles(
     twice = [name for name in dict.fromkeys(several) if several.count(name) > 1]
     options = ", ".join(named)
     refuse((twice, f"{options}: needed others each, got {listed(twice)} twice"))
-    if named["--humans"]:
-        return judging.judges, named["--humans"]
+    judges, humans, _ = named.values()
+    refuse((not judges, "--judge: needed the rater who is the judge"))
+    if humans:
+        return judges, humans
+    several += [name for name, kind in kinds.items() if kind != "human"]
     humans = tuple(name for name in raters if name not in several)
     for name in humans:
         refuse(
@@ -170,7 +185,7 @@ def _roles(
                 f"--reference {name} holds it apart; if it is one, --humans names all",
             )
         )
-    return judging.judges, humans
+    return judges, humans
 
 
 # ---- judges beside humans ----
@@ -291,8 +306,9 @@ def _differences(part: _Part) -> _Made:
         humans, judges, target=questions.target, level=questions.level, **_how(part)
     ):
         row = {of.name: getattr(pair, of.name) for of in fields(pair)}
-        row["interval"] = as_document(pair.interval)
-        yield "judge_differences", row, {"group": f"{pair.first} and {pair.second}"}
+        ends = {"low": pair.interval.low, "high": pair.interval.high}
+        group = {"group": f"{pair.first} and {pair.second}"}
+        yield "judge_differences", row, {**ends, **group}
 
 
 def _against_reference(part: _Part, reference: str) -> _Made:

@@ -51,7 +51,6 @@ class Judging:
                 self.epsilon is not None and self.annotators is not None,
                 "--epsilon, --annotators: needed one of them, got both",
             ),
-            (not self.judges, "--judge: needed the rater who is the judge"),
         )
 
     @property

@@ -69,7 +69,8 @@ _STATISTICS = tuple(GROUPS["Ratings you have"])
 
 
 def _module_of(command: str) -> str:
-    place = "masrel.cli" if command in _STATISTICS else "masrel.lab.cli"
+    is_of_files = command.partition("_")[0] in _STATISTICS
+    place = "masrel.cli" if is_of_files else "masrel.lab.cli"
     return f"{place}.{command}"
 
 

@@ -35,6 +35,9 @@ RENAMED = {
 }
 """Commands of 0.1, and options that were modes, with what they are called now."""
 
+MODES = ("plan --judge",)
+"""Options that make another command of one, with options of its own."""
+
 STUDY = "STUDY"
 """Name of the command of a group that does what the group is named after."""
 
@@ -42,6 +45,8 @@ STUDY = "STUDY"
 _CALLED = {
     "coefficient": "coefficients",
     "high": "interval",
+    "human_accuracy": "accuracy",
+    "judge_accuracy": "accuracy",
     "low": "interval",
     "method": "interval",
     "rng": "seed",
@@ -142,12 +147,17 @@ class ListedCommands(Commands):
         for old in (" ".join(args[:2]), args[0]):
             if old in RENAMED and args[0] not in self.list_commands(ctx):
                 raise _renamed(old, ctx)
+        for mode in MODES:
+            command, option = mode.split()
+            if args[0] == command and option in args:
+                rest = [arg for arg in args[1:] if arg != option]
+                return mode, self.get_command(ctx, mode), rest
         return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command."""
         known = self.list_commands(ctx)
-        if cmd_name not in known:
+        if cmd_name not in (*known, *MODES):
             if ctx.resilient_parsing:  # as it is where a shell completes names
                 return None
             from difflib import get_close_matches  # loaded only for an error
@@ -155,8 +165,9 @@ class ListedCommands(Commands):
             near = get_close_matches(cmd_name, known, n=1)
             hint = f" Did you mean '{near[0]}'?" if near else ""
             ctx.fail(f"No such command '{cmd_name}'.{hint}")
-        module = importlib.import_module(self.place(cmd_name))
-        command: click.Command = getattr(module, cmd_name)
+        name = cmd_name.replace(" --", "_")
+        module = importlib.import_module(self.place(name))
+        command: click.Command = getattr(module, name)
         return command
 
     def format_commands(

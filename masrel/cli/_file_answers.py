@@ -246,9 +246,10 @@ def _show_answers(
     is_agreement = answered[0].name == "agreement"
     is_sentence = output.sentence and (is_agreement or judging is not None)
     is_text = not (output.csv or output.latex or is_sentence)
+    is_brief = is_text or (is_sentence and not is_agreement)
     table, *more = first_screen(
         *(others, questions, answered),
-        detail="all" if output.explain else "brief" if is_text else "usual",
+        detail="all" if output.explain else "brief" if is_brief else "usual",
         items=output.item_name,
         is_text=is_text,
         in_sentences=output.sentence,
@@ -262,7 +263,8 @@ def _show_answers(
         data=table.data,
         items=output.item_name,
     )
-    if judging is not None:
+    if not is_agreement and is_sentence:
+        more = []  # a sentence says them all
         sentences = partial(judge_sentences, answered, output.item_name, table.data)
     columns = shutil.get_terminal_size((_WIDTH, 24)).columns
     write_output(

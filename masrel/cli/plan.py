@@ -161,7 +161,7 @@ def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) 
     With --items or --raters alone, the other is solved for; with both, a study of that
     size is described; with --prices and neither, the cheapest is solved for. Ranges
     make a grid. STUDY is a folder with a protocol: each line of its plan is described
-    at its size.
+    at its size. masrel plan --judge --help: items for a judge, such as a model.
     """
     arguments = {key: value for key, value in options.items() if value is not None}
     labels, plans = _plans(study, {"rng": 0, **arguments}, is_quiet=output.quiet)

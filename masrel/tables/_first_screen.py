@@ -13,9 +13,7 @@ from masrel.tables._answer_tables import Detail, answer_table
 from masrel.tables._tables import (
     SIMULATED,
     Table,
-    capital,
     counted,
-    joined,
     number,
     p_text,
     percent,
@@ -59,32 +57,12 @@ def first_screen(
     ]
     if is_text:
         at, text = result_sentence(answered, items)
-        notes = (*text.splitlines(), *tables[at].notes)
-        tables[at] = replace(tables[at], notes=notes)
+        lines = (*text.splitlines(), *tables[at].notes)
+        tables[at] = replace(tables[at], notes=lines)
         tables[0] = replace(tables[0], caption="")
     first, *more = tables
-    read = (*what_was_read(ratings, items, detail), *_roles(ratings, questions))
-    notes = (*first.notes, *left_out(ratings, questions))
-    return [replace(first, read=read, notes=notes), *more]
-
-
-def _roles(file: RatingsFile, questions: Questions) -> Iterator[str]:
-    """Return who of the raters are judges and humans, if some are judges."""
-    if (judging := questions.judging) is None:
-        return
-    others = (*judging.judges, questions.reference)
-    humans = [name for name in file.read["raters"] if name not in others]
-    roles = {
-        "judge": judging.judges,
-        "human": judging.humans or humans,
-        "reference": [] if questions.reference is None else [questions.reference],
-    }
-    texts = (
-        f"{role}{'s' * (len(names) > 1)} {joined(names)}"
-        for role, names in roles.items()
-        if names
-    )
-    yield f"{capital('; '.join(texts))}."
+    read, notes = what_was_read(ratings, items, detail), left_out(ratings, questions)
+    return [replace(first, read=tuple(read), notes=(*first.notes, *notes)), *more]
 
 
 def what_was_read(

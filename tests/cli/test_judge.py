@@ -9,7 +9,13 @@ from typing import Any
 
 import pytest
 
-from masrel.judges import advantage, alternative_annotator_test, rate_estimates
+from masrel.judges import (
+    advantage,
+    alternative_annotator_test,
+    judge_plan,
+    labels_needed,
+    rate_estimates,
+)
 from tests.cli.process import Caller
 
 EXPERT = ("--annotators", "expert")
@@ -226,3 +232,22 @@ def test_pages_and_pictures_of_both_questions(masrel: Caller, tmp_path: Path) ->
     assert "Rogan" in text
     assert text.count("<figure") >= 2
     assert "ε" in picture.read_text("utf-8") or picture.stat().st_size > 10_000
+
+
+def test_items_are_planned_for_a_judge_and_for_a_rate(masrel: Caller) -> None:
+    rate = ("--rate", "0.7", "--sensitivity", "0.9", "--specificity", "0.8")
+    aim = ("--items", "500", "--half-width", "0.06", "--json", "-")
+    labels = json.loads(masrel("plan", "--judge", *rate, *aim).out)["n_labels"]
+    share = {"rate": 0.7, "sensitivity": 0.9, "specificity": 0.8}
+    assert labels == labels_needed(0.06, n_items=500, **share)
+    call = ("plan", "--judge", "--epsilon", "0.2", "--raters", "3", "--accuracy")
+    plan = json.loads(masrel(*call, "0.9,0.85", "--items", "40", "--json", "-").out)
+    made = judge_plan(
+        epsilon=0.2,
+        n_humans=3,
+        human_accuracy=0.9,
+        judge_accuracy=0.85,
+        n_items=40,
+        rng=0,
+    )
+    assert (plan["n_items"], plan["power"]) == (40, made.power)

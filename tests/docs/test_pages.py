@@ -63,6 +63,8 @@ NOT_RUN = [
     ("docs/hardware.md", "needs a CAN bus"),
     ("docs/hardware.md", "needs a CAN bus"),
     ("docs/hardware.md", "needs a CAN bus"),
+    ("docs/judges.md", "installs masrel"),
+    ("docs/judges.md", "is for GitHub"),
     ("docs/report.md", "needs Chromium"),
     ("docs/report.md", "needs other interpreters"),
     ("docs/serving.md", "serves until it is stopped"),

@@ -1,0 +1,93 @@
+"""``masrel plan --judge``: how many items a judge needs, to pass or for a rate."""
+
+from dataclasses import asdict
+from typing import Any
+
+import click
+
+from masrel._input import refuse
+from masrel.cli._options import (
+    OutputOptions,
+    output_options,
+    split_commas,
+    write_output,
+)
+
+
+def _shares(text: str) -> list[float]:
+    try:
+        return [float(part) for part in split_commas(text)]
+    except ValueError as error:
+        raise click.BadParameter(f"needs shares as 0.9,0.85, got {text!r}") from error
+
+
+@click.command("plan --judge")
+@click.option("--epsilon", type=float, help="How much worse the judge may be.")
+@click.option("--raters", "n_humans", type=int, help="Humans who grade every item.")
+@click.option(
+    "--accuracy",
+    type=_shares,
+    metavar="SHARES",
+    help="How often a human is right, and the judge, as 0.9,0.85; one for both.",
+)
+@click.option("--categories", "n_categories", default=2, show_default=True)
+@click.option("--power", default=0.8, show_default=True, help="Chance to pass.")
+@click.option("--seed", "rng", default=0, show_default=True)
+@click.option(
+    "--rate", type=float, help="Rate that is expected, in place of --epsilon."
+)
+@click.option("--sensitivity", type=float, help="Of the judge, for --rate.")
+@click.option("--specificity", type=float, help="Of the judge, for --rate.")
+@click.option("--half-width", type=float, help="Of the interval of --rate.")
+@click.option("--level", default=0.95, show_default=True, help="Of this interval.")
+@click.option(
+    "--items",
+    "n_items",
+    type=int,
+    help="How many the judge grades, for --rate; else how many all grade, whose power "
+    "is then told.",
+)
+@output_options(json="Write every number here; - prints them, and nothing else.")
+def plan_judge(output: OutputOptions, **options: Any) -> None:
+    """Say how many items must be labelled for a judge.
+
+    With --epsilon: how many items a judge and the humans must all grade, so that it
+    passes the alternative annotator test of masrel judge as often as --power says, by
+    1000 simulated studies. With --rate: how many of --items need a label, so that the
+    rate corrected for the judge is known to --half-width.
+    """
+    needed = {
+        "epsilon": ("n_humans", "accuracy"),
+        "rate": ("sensitivity", "specificity", "half_width", "n_items"),
+    }
+    aims = [name for name in needed if options[name] is not None]
+    refuse((len(aims) != 1, "--epsilon, --rate: needed one of them"))
+    names = {param.name: param.opts[0] for param in plan_judge.params}
+    absent = [str(names[name]) for name in needed[aims[0]] if options[name] is None]
+    refuse((absent, f"{', '.join(absent)}: needed with --{aims[0]}"))
+    from masrel import judges
+
+    if aims == ["rate"]:
+        keys = (*needed["rate"], "rate", "level")
+        n_labels = judges.labels_needed(**{key: options[key] for key in keys})
+        document = {"n_labels": n_labels, **{key: options[key] for key in keys}}
+        text = (
+            f"{n_labels} of {options['n_items']} items need a label for an interval "
+            f"of the rate that is expected to be ± {options['half_width']:g}."
+        )
+    else:
+        human, *judge = options["accuracy"]
+        keys = ("epsilon", "n_humans", "n_categories", "n_items", "power", "rng")
+        plan = judges.judge_plan(
+            human_accuracy=human,
+            judge_accuracy=judge[0] if judge else None,
+            **{key: options[key] for key in keys},
+        )
+        document = asdict(plan)
+        text = (
+            f"With {plan.n_items} items that {options['n_humans']} humans and the "
+            f"judge grade, the judge passes at ε = {options['epsilon']:g} in "
+            f"{100.0 * plan.power:.0f} % of studies (Monte Carlo error "
+            f"{100.0 * plan.monte_carlo_error:.1f})."
+        )
+    write_output(output, document=lambda: document, text=lambda: text)
