@@ -55,9 +55,9 @@ _Floats = NDArray[np.float64]
 _Integers = NDArray[np.signedinteger[Any]]
 
 # seven of Okabe and Ito's, neighbours far apart, and grey for one more, or all others;
-# black is what a page writes in
+# black is what a page writes in, and of BLUE it has its own in the dark
 _HUES = (
-    BLUE,
+    "#0073B2",
     ORANGE,
     "#009E73",
     "#CC79A7",
