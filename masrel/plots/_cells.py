@@ -58,9 +58,13 @@ def cells(
     colours = drawn.to_rgba(values)
     for (row, column), text in np.ndenumerate(letters):
         x = left + (column + 0.5) * step
-        colour = letters_on(colours[row, column]) if row < n and column < m else GREY
-        if text:
-            axes.text(x, row, text, ha="center", va="center", fontsize=8, color=colour)
+        is_inside = row < n and column < m
+        colour = letters_on(colours[row, column]) if is_inside else GREY
+        if text:  # for which no layout need make room within the axes
+            axes.text(
+                x, row, text, ha="center", va="center", fontsize=8, color=colour,
+                in_layout=not is_inside,
+            )  # fmt: skip
     for row, column in np.argwhere(np.zeros((n, m)) if framed is None else framed):
         corner = left + column * step, row - 0.5
         look: dict[str, Any] = {"edgecolor": frame, "linewidth": 1.2 * width}

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any, cast
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_mixed import MixedModeRenderer
+from matplotlib.backends.backend_svg import RendererSVG
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -89,11 +91,10 @@ _SCREEN = 120  # pixels to the inch in a notebook
 _DPI = 200  # of pixels, also of those inside vectors
 _LEAST_ACROSS, _LEAST_DOWN = 100.0, 72.0  # points of an axes
 _ABOVE = 20.0  # points of a stamp
-_NO_TIME: dict[Form, dict[str, None]] = {  # what no file is to hold
-    "png": {"Software": None},
-    "svg": {"Date": None},
-    "pdf": {"CreationDate": None},
-    "inline": dict.fromkeys(("Date", "Creator", "Format", "Type")),
+_HOW: dict[Form, dict[str, Any]] = {  # files hold no time
+    # far sooner packed than with the most that can be, for a twentieth more bytes
+    "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 3}},
+    "pdf": {"metadata": {"CreationDate": None}},
 }
 _OF_PAGE = {  # colours that follow the page into the dark
     BLACK: "currentColor",
@@ -229,33 +230,61 @@ def finished(
     """Return the files of a figure of the house style, under its stamp."""
     if set(forms) - {"inline"}:  # whose letters are the reader's
         complete_fonts(figure)
-    files: dict[Form, bytes] = {}
     lay_out(figure, stamp)
     # The same layout for every form: with this setting each form begins anew with one.
     with mpl.rc_context({"figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)  # "none" leaves one, for which all is drawn
-        for form in forms:
-            files[form] = _printed(figure, form)
+        vectors = [form for form in forms if form not in _HOW]
+        files = _vectors(figure, vectors) if vectors else {}
+        for form in (form for form in forms if form in _HOW):
+            file = io.BytesIO()
+            figure.canvas.print_figure(file, format=form, dpi=_DPI, **_HOW[form])
+            files[form] = file.getvalue()
     return files
 
 
-def _printed(figure: Figure, form: Form) -> bytes:
-    file = io.BytesIO()
-    how: dict[str, Any] = {"dpi": _DPI, "metadata": _NO_TIME[form]}
-    if form != "inline":
-        figure.canvas.print_figure(file, format=form, **how)
-        return file.getvalue()
-    # on the page's own ground, in letters of the reader
-    for axes in figure.findobj(Axes):
-        axes.patch.set_visible(False)
-    with mpl.rc_context({"svg.fonttype": "none"}):
-        figure.canvas.print_figure(file, format="svg", facecolor="none", **how)
-    return _inlined(file.getvalue().decode()).encode()
+_MARK = "\N{START OF TEXT}"  # no text of a figure can have it
+
+
+class _Vectors(RendererSVG):
+    """Draws texts as curves, then as letters; a mark is before, between and after."""
+
+    writer: Any
+    forms: Sequence[Form]  # a form that is not among them has no texts
+
+    def draw_text(self, *args: Any, **options: Any) -> None:
+        for form, kind in (("svg", "path"), ("inline", "none")):
+            self.writer.comment(_MARK)
+            if form in self.forms:
+                mpl.rcParams["svg.fonttype"] = kind
+                super().draw_text(*args, **options)  # type: ignore[no-untyped-call]
+        self.writer.comment(_MARK)
+
+
+def _vectors(figure: Figure, forms: Sequence[Form]) -> dict[Form, bytes]:
+    # A file, whose letters are curves, and a part of a page, in letters of the reader:
+    # by one drawing, as nothing takes longer.
+    file, (width, height) = io.StringIO(), figure.get_size_inches()
+    how: dict[str, Any] = {"image_dpi": _DPI, "metadata": {"Date": None}}
+    vectors: Any = _Vectors(_POINTS * width, _POINTS * height, file, **how)  # type: ignore[no-untyped-call]
+    vectors.forms = forms
+    # what is rasterized goes through pixels
+    mixed: Any = MixedModeRenderer(figure, width, height, _DPI, vectors)  # type: ignore[no-untyped-call]
+    figure.draw(mixed)
+    vectors.finalize()
+    parts = file.getvalue().split(f"<!-- {_MARK} -->\n")
+    curves, letters = (
+        "".join(part.rstrip(" ") for i, part in enumerate(parts) if i % 3 != other)
+        for other in (2, 1)
+    )
+    made: dict[Form, str] = {"svg": curves, "inline": _inlined(letters)}
+    return {form: made[form].encode() for form in forms}
 
 
 def _inlined(svg: str) -> str:
     """Return the element of an SVG, its colours those of the page around it."""
-    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg[svg.index("<svg") :])
+    svg = re.sub(r"(?s) *<metadata>.*?</metadata>\n", "", svg[svg.index("<svg") :])
+    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg)
     for colour, of_page in _OF_PAGE.items():
         svg = svg.replace(colour.lower(), of_page)
     # names of their own, as several stand in one page
