@@ -41,7 +41,7 @@ from masrel.lab.elbow.parameters import (
     onset_share,
     post_catch_law,
 )
-from masrel.lab.elbow.tone import JointModel
+from masrel.lab.elbow.tone import JointModel, ToneModel
 
 __all__ = [
     "Outline",
@@ -452,7 +452,7 @@ def _peak(line: Timeline, motion: Motion, laid: list[TorqueSegment]) -> Number:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Line:
+class Line:
     """What a figure draws of a motion."""
 
     time: Floats = field(compare=False, repr=False)
@@ -461,8 +461,19 @@ class _Line:
     phase: NDArray[np.int8] = field(compare=False, repr=False)
 
 
+def sampled(model: ToneModel, motion: Motion, rate_hz: float) -> Line:
+    """Return a law of tone at a fixed rate, its events at their own times."""
+    time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
+    return Line(
+        time=time,
+        angle=motion.angle(time),
+        torque=model.torque(motion, time),
+        phase=model._phase(motion, time),
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trace(_Line):
+class Trace(Line):
     """Columns of a motion at a fixed rate; arrays are read-only.
 
     Attributes
@@ -552,7 +563,7 @@ def _stepped(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outline(_Line):
+class Outline(Line):
     """Points of a line; where the torque jumps, two have the same time.
 
     Attributes

@@ -14,9 +14,11 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel._input import check_option
 from masrel.errors import ParameterError
+from masrel.lab.elbow._polynomials import Number
 from masrel.lab.elbow.motions import _SAME_TIME, Floats, Motion
 
 __all__ = ["Law", "Quantity", "Stepper", "ToneEvent", "ToneModel"]
@@ -237,7 +239,7 @@ class ToneStepper:
     def step(self, time_s: float, angle: float, velocity: float) -> float:
         """Decide the torque of one sample, N·m."""
         memory = self.model._sampled(self, time_s, angle, velocity)
-        return self.model._law(angle, velocity, self.rest, *memory)
+        return float(self.model._law(angle, velocity, self.rest, *memory))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -265,6 +267,7 @@ class ToneModel(Law):
 
     catch_event: ClassVar[str | None] = None
     _kept: ClassVar[dict[str, Any]] = {}  # by a stepper, before the first sample
+    _phases: ClassVar[dict[str, int]] = {}  # that begin with an event, by its name
 
     range_end: float = quantity(math.radians(146.0), "rad", "angle", is_choice=False)
     speed_threshold: float = quantity(
@@ -329,16 +332,22 @@ class ToneModel(Law):
             raise ParameterError("times: needs 0 s or later, got an earlier one or nan")
         moments = np.minimum(moments, motion.duration)
         angle, velocity = motion.angle(moments), motion.velocity(moments)
-        columns = (angle, velocity, *self._memory(motion, moments))
-        rest = self.rest_from(motion.start)
-        rows = zip(*columns, strict=True)
-        return np.array([self._law(a, v, rest, *memory) for a, v, *memory in rows])
+        rest, memory = self.rest_from(motion.start), self._memory(motion, moments)
+        return np.asarray(self._law(angle, velocity, rest, *memory))
+
+    def _phase(self, motion: Motion, times: Floats) -> NDArray[np.int8]:
+        """Return positions in `masrel.lab.recording.PHASES` at times of a motion."""
+        codes = np.zeros(times.shape, dtype=np.int8)
+        for event in self.events(motion):
+            if event.name in self._phases:
+                codes[times >= event.time] = self._phases[event.name]
+        return codes
 
     @abstractmethod
     def _law(
-        self, angle: float, velocity: float, rest: float, /, *memory: float
-    ) -> float:
-        """Return the torque, N·m."""
+        self, angle: Number, velocity: Number, rest: float, /, *memory: Number
+    ) -> Number:
+        """Return the torque of one sample, or of columns of them, N·m."""
 
     @abstractmethod
     def _events(self, motion: Motion, /) -> Iterator[tuple[str, float]]:

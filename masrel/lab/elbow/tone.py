@@ -20,7 +20,14 @@ import numpy as np
 from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import events
-from masrel.lab.elbow._polynomials import Polynomial
+from masrel.lab.elbow._polynomials import (
+    Number,
+    Polynomial,
+    functions_of,
+    greatest,
+    least,
+    pick,
+)
 from masrel.lab.elbow.joint_model import (
     Quantity,
     ToneEvent,
@@ -151,7 +158,9 @@ class LeadPipe(ToneModel):
         """Return the largest slopes, over angle and velocity: a bristle that sticks."""
         return self.stiffness + self.coulomb_torque / self.bristle_travel, self.damping
 
-    def _law(self, angle: float, velocity: float, rest: float, *memory: float) -> float:
+    def _law(
+        self, angle: Number, velocity: Number, rest: float, *memory: Number
+    ) -> Number:
         spring = self.stiffness * (angle - rest) + self.damping * velocity
         return spring + self.coulomb_torque * memory[0] / self.bristle_travel
 
@@ -268,21 +277,22 @@ class Cogwheel(LeadPipe):
                 f"got {self.gap_edge:g} s"
             )
 
-    def _gap(self, since: float) -> float:
+    def _gap(self, since: Number) -> Number:
         # how far a gap is open, 0 to 1, so long after the onset of the movement, s
         period = 1.0 / self.gap_rate
         # a gap that begins now but for rounding has begun
-        left = period - math.fmod(since + 1e-12, period)
+        left = period - functions_of(since).fmod(since + 1e-12, period)
         inside = self.gap_share * period - left
-        if inside < 0.0:
-            return 0.0
-        return _edge(inside, self.gap_edge) * _edge(left, self.gap_edge)
+        is_open = _edge(inside, self.gap_edge) * _edge(left, self.gap_edge)
+        return pick(inside < 0.0, 0.0, is_open)
 
-    def _closing(self, last: float, over: float) -> float:
+    def _closing(self, last: float, over: Number) -> Number:
         # a gap in which the movement ended closes as any other does
         return last * (1.0 - _edge(over, self.gap_edge))
 
-    def _law(self, angle: float, velocity: float, rest: float, *memory: float) -> float:
+    def _law(
+        self, angle: Number, velocity: Number, rest: float, *memory: Number
+    ) -> Number:
         bristle, gap = memory
         torque = LeadPipe._law(self, angle, velocity, rest, bristle)
         lost = self.gap_depth * gap * self.coulomb_torque
@@ -320,18 +330,17 @@ class Cogwheel(LeadPipe):
         gap = np.zeros(times.size)
         for begun, until in movements(motion, self.movement_speed):
             last = self._gap(until - begun)
-            for i in np.flatnonzero((times >= begun) & (times < until + self.gap_edge)):
-                since = float(times[i]) - begun
-                over = float(times[i]) - until
-                gap[i] += self._gap(since) if over < 0.0 else self._closing(last, over)
+            mine = (times >= begun) & (times < until + self.gap_edge)
+            since, over = times[mine] - begun, times[mine] - until
+            closing = self._closing(last, over)
+            gap[mine] += np.where(over < 0.0, self._gap(since), closing)
         return [*LeadPipe._memory(self, motion, times), gap]
 
 
-def _edge(since: float, length: float) -> float:
+def _edge(since: Number, length: float) -> Number:
     # a raised cosine from 0 to 1 over `length`
-    if since >= length:
-        return 1.0
-    return 0.5 - 0.5 * math.cos(math.pi * since / length)
+    share = least(since / length, 1.0) if length else 1.0
+    return 0.5 - 0.5 * functions_of(share).cos(math.pi * share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -387,6 +396,11 @@ class ClaspKnife(ToneModel):
     kind: ClassVar[str] = "clasp-knife"
     _kept: ClassVar[dict[str, Any]] = {"fired": math.nan}  # when the latch closed, s
     catch_event: ClassVar[str | None] = "fire"
+    _phases: ClassVar[dict[str, int]] = {
+        "fire": CATCH,
+        "release": POST_CATCH,
+        "arm": PRE_CATCH,
+    }
 
     threshold: float = quantity(math.radians(56.27), "rad", "angle", is_choice=False)
     threshold_slope: float = quantity(0.25, "s", "not negative", is_choice=False)
@@ -410,26 +424,26 @@ class ClaspKnife(ToneModel):
         """Return the largest torque of a stretch and the way back, N·m."""
         rest = self.rest_from(start_angle)
         off = max(abs(start_angle - rest), abs(self.range_end - rest))
-        return self.passive_stiffness * off + self._reflex(self.range_end, speed)
+        return self.passive_stiffness * off + float(self._reflex(self.range_end, speed))
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: before the release."""
         reflex = self.reflex_stiffness
         return self.passive_stiffness + reflex, reflex * self.threshold_slope
 
-    def _reflex(self, angle: float, velocity: float) -> float:
-        early = self.threshold_slope * max(velocity, 0.0)
-        return self.reflex_stiffness * max(angle - self.threshold + early, 0.0)
+    def _reflex(self, angle: Number, velocity: Number) -> Number:
+        early = self.threshold_slope * greatest(velocity, 0.0)
+        return self.reflex_stiffness * greatest(angle - self.threshold + early, 0.0)
 
-    def _scale(self, since: float) -> float:
+    def _scale(self, since: Number) -> Number:
         # g, so long after the latch closed, s
-        released = since - self.release_delay
-        if released <= 0.0:
-            return 1.0
-        left = math.exp(-released / self.release_time)
+        released = greatest(since - self.release_delay, 0.0)
+        left = functions_of(released).exp(-released / self.release_time)
         return self.residual_share + (1.0 - self.residual_share) * left
 
-    def _law(self, angle: float, velocity: float, rest: float, *memory: float) -> float:
+    def _law(
+        self, angle: Number, velocity: Number, rest: float, *memory: Number
+    ) -> Number:
         passive = self.passive_stiffness * (angle - rest)
         return passive + memory[0] * self._reflex(angle, velocity)
 
@@ -480,8 +494,8 @@ class ClaspKnife(ToneModel):
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
         scale = np.ones(times.size)
         for closed, opened in self._latched(motion):
-            for i in np.flatnonzero((times >= closed) & (times < opened)):
-                scale[i] = self._scale(float(times[i]) - closed)
+            mine = (times >= closed) & (times < opened)
+            scale[mine] = self._scale(times[mine] - closed)
         return [scale]
 
 
@@ -567,7 +581,7 @@ class Contracture(ToneModel):
         """Return the largest torque of a stretch and the way back, N·m."""
         rest = self.rest_angle
         ends = [abs(self._law(at, 0.0, rest)) for at in (start_angle, self.range_end)]
-        return max(ends) + self.damping * speed
+        return float(max(ends)) + self.damping * speed
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: those at `range_end`."""
@@ -577,12 +591,11 @@ class Contracture(ToneModel):
             self.end_steepness * beyond
         ), self.damping
 
-    def _law(self, angle: float, velocity: float, rest: float, *_: float) -> float:
+    def _law(self, angle: Number, velocity: Number, rest: float, *_: Number) -> Number:
         cap = self.cap_angle
-        within = min(angle, cap) - self.end_angle
-        end = self.end_torque * math.exp(self.end_steepness * within)
-        if angle > cap:
-            end += self.end_stiffness * (angle - cap)
+        within = least(angle, cap) - self.end_angle
+        end = self.end_torque * functions_of(within).exp(self.end_steepness * within)
+        end = end + self.end_stiffness * greatest(angle - cap, 0.0)
         return self.stiffness * (angle - rest) + self.damping * velocity + end
 
     def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
@@ -636,6 +649,7 @@ class Dystonia(ToneModel):
     """
 
     kind: ClassVar[str] = "dystonia"
+    _phases: ClassVar[dict[str, int]] = {"episode": CATCH}
     _kept: ClassVar[dict[str, Any]] = {"begun": math.nan}  # the first sample, s
 
     stiffness: float = quantity(3.0, "N·m/rad", "not negative")
@@ -657,18 +671,17 @@ class Dystonia(ToneModel):
         """Return the largest slopes, over angle and velocity: at full activation."""
         return self.stiffness, self.damping
 
-    def _activation(self, since: float) -> float:
+    def _activation(self, since: Number) -> Number:
         # a, so long after the first sample, s: both halves of the solution
-        rest, begun = self.resting_activation, since - self.episode_start
-        if begun <= 0.0:
-            return rest
-        risen = min(begun, self.episode_duration)
-        highest = 1.0 - (1.0 - rest) * math.exp(-risen / self.rise_time)
-        return rest + (highest - rest) * math.exp((risen - begun) / self.fall_time)
+        rest, begun = self.resting_activation, greatest(since - self.episode_start, 0.0)
+        risen, exp = least(begun, self.episode_duration), functions_of(since).exp
+        highest = 1.0 - (1.0 - rest) * exp(-risen / self.rise_time)
+        more = (highest - rest) * exp((risen - begun) / self.fall_time)
+        return rest + pick(begun > 0.0, more, 0.0)
 
     def _law(
-        self, angle: float, velocity: float, _rest: float, *memory: float
-    ) -> float:
+        self, angle: Number, velocity: Number, _rest: float, *memory: Number
+    ) -> Number:
         full = self.stiffness * (angle - self.posture_angle) + self.damping * velocity
         return memory[0] * full
 
@@ -689,7 +702,7 @@ class Dystonia(ToneModel):
         yield "episode ends", self.episode_start + self.episode_duration
 
     def _memory(self, _motion: Motion, times: Floats) -> list[Floats]:
-        return [np.array([self._activation(time) for time in times.tolist()])]
+        return [self._activation(times)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -750,6 +763,7 @@ class Clonus(ToneModel):
         "farthest": 0.0,  # that the arm has been since, rad
     }
     catch_event: ClassVar[str | None] = "trigger"
+    _phases: ClassVar[dict[str, int]] = {"trigger": CATCH, "stop": PRE_CATCH}
 
     beat_rate: float = quantity(5.0, "Hz", "frequency")
     beat_torque: float = quantity(4.0, "N·m", "not negative")
@@ -775,17 +789,14 @@ class Clonus(ToneModel):
         return 0.0, 0.0
 
     def _law(
-        self, _angle: float, _velocity: float, _rest: float, *memory: float
-    ) -> float:
-        (since,) = memory  # the first beat began, s
-        if since < 0.0 or self.beat_share == 0.0:
-            return self.base_torque
-        x = math.fmod(since * self.beat_rate, 1.0) / self.beat_share
-        if x >= 1.0:
-            return self.base_torque
-        left = math.exp(-since / self.fade_time) if self.fade_time else 1.0
-        beat = math.sin(math.pi * x)
-        return self.base_torque + self.beat_torque * left * beat * beat
+        self, _angle: Number, _velocity: Number, _rest: float, *memory: Number
+    ) -> Number:
+        since = greatest(memory[0], 0.0)  # the first beat began, s
+        functions = functions_of(since)
+        x = functions.fmod(since * self.beat_rate, 1.0) / (self.beat_share or math.inf)
+        left = functions.exp(-since / self.fade_time) if self.fade_time else 1.0
+        beat = self.beat_torque * left * functions.sin(math.pi * x) ** 2
+        return self.base_torque + pick((memory[0] >= 0.0) & (x < 1.0), beat, 0.0)
 
     def _sampled(
         self, joint: ToneStepper, time_s: float, angle: float, velocity: float
@@ -890,6 +901,7 @@ class ThresholdReflex(ToneModel):
         "late": None,  # the latest of the others: rad, rad/s
     }
     catch_event: ClassVar[str | None] = "reflex"
+    _phases: ClassVar[dict[str, int]] = {"reflex": CATCH, "reflex ends": PRE_CATCH}
 
     threshold: float = quantity(math.radians(61.97), "rad", "angle", is_choice=False)
     threshold_slope: float = quantity(0.25, "s", "not negative", is_choice=False)
@@ -937,7 +949,7 @@ class ThresholdReflex(ToneModel):
         rest = self.rest_from(start_angle)
         off = max(abs(start_angle - rest), abs(self.range_end - rest))
         passive = self.passive_stiffness * off + self.passive_damping * speed
-        return passive + self._reflex(self.range_end, speed)
+        return passive + float(self._reflex(self.range_end, speed))
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:
         """Return the largest slopes, over angle and velocity, of those of a speed."""
@@ -946,19 +958,17 @@ class ThresholdReflex(ToneModel):
         damping = stiffness * self.threshold_slope + self.stiffening * over
         return self.passive_stiffness + stiffness, self.passive_damping + damping
 
-    def _law(self, angle: float, velocity: float, rest: float, *memory: float) -> float:
+    def _law(
+        self, angle: Number, velocity: Number, rest: float, *memory: Number
+    ) -> Number:
         spring = self.passive_stiffness * (angle - rest)
         return spring + self.passive_damping * velocity + memory[0]
 
-    def _reflex(self, angle: float, velocity: float) -> float:
+    def _reflex(self, angle: Number, velocity: Number) -> Number:
         # of the late angle and velocity
-        over = angle - self.threshold + self.threshold_slope * velocity
-        if over <= 0.0:
-            return 0.0
-        stiffness = self.reflex_stiffness + self.stiffening * max(velocity, 0.0)
-        torque = stiffness * over
-        limit = self.largest_reflex
-        return torque if limit is None else min(torque, limit)
+        over = greatest(angle - self.threshold + self.threshold_slope * velocity, 0.0)
+        stiffness = self.reflex_stiffness + self.stiffening * greatest(velocity, 0.0)
+        return least(stiffness * over, self.largest_reflex or math.inf)
 
     def _sampled(
         self, joint: ToneStepper, time_s: float, angle: float, velocity: float
@@ -991,8 +1001,7 @@ class ThresholdReflex(ToneModel):
         late = np.maximum(times - self.delay, 0.0)
         moved = times >= self.delay  # before that the arm rests where it starts
         velocity = np.where(moved, motion.velocity(late), 0.0)
-        samples = zip(motion.angle(late), velocity, strict=True)
-        return [np.array([self._reflex(*sample) for sample in samples])]
+        return [self._reflex(motion.angle(late), velocity)]
 
 
 JointModel = ElbowParameters | ToneModel

@@ -20,12 +20,10 @@ from masrel.lab.elbow import (
     ConstantSpeed,
     ElbowParameters,
     JointModel,
-    Outline,
-    Trace,
     evaluate,
     outline,
-    trace,
 )
+from masrel.lab.elbow._torque import Line, sampled
 from masrel.lab.protocol import Model, Protocol, joint_model
 from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
 from masrel.lab.report._material import (
@@ -58,7 +56,6 @@ _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
 _MODEL = Column(key="model", heading="Model", align="left")
 
 _Floats = NDArray[np.float64]
-_Line = Outline | Trace  # of the exact law, or samples of another kind
 
 
 def speeds_section(material: Material) -> Iterator[Content]:
@@ -162,7 +159,7 @@ class TracedModel:
     peaks: Sequence[float]  # largest torque at each speed, N·m
     # what is drawn: the line of every speed, or of a few of many
     shown: Sequence[Speed]
-    lines: Sequence[_Line]
+    lines: Sequence[Line]
     # of many: where most are at each "time", s, while half of them go on: (n_points,)
     # and "angle", deg, and "torque", N·m, from the lowest to the highest, (4, n_points)
     band: Mapping[str, _Floats] | None
@@ -217,14 +214,15 @@ def _traced(
         return ConstantSpeed(start=start, end=end, speed=math.radians(deg_s))
 
     known = [speed.mean_speed_deg_s for speed in speeds]
-    line_of: Callable[[ConstantSpeed], _Line]
+    line_of: Callable[[ConstantSpeed], Line]
     if isinstance(joint, ElbowParameters):
         line_of = partial(outline, joint, n_points=_N_POINTS)
         outputs = evaluate(joint, [*map(stretch, known)], ["peak_torque"])
         peaks = outputs.column("peak_torque").tolist()
     else:
-        line_of = partial(trace, joint, rate_hz=protocol.device.rate_hz)
-        peaks = [float(line_of(stretch(deg_s)).torque.max()) for deg_s in known]
+        line_of = partial(sampled, joint, rate_hz=protocol.device.rate_hz)
+        largest = {v: float(line_of(stretch(v)).torque.max()) for v in {*known}}
+        peaks = [largest[deg_s] for deg_s in known]
     shown, band = list(range(len(known))), None
     if len(known) > MANY_STRETCHES:
         ranks = at_ranks(known)
@@ -249,7 +247,7 @@ def _traced(
     )
 
 
-def _band(lines: Sequence[_Line]) -> dict[str, _Floats]:
+def _band(lines: Sequence[Line]) -> dict[str, _Floats]:
     # lines at evenly spaced quantiles of the speeds: as many are below each time's
     # quantile as of all stretches; the slower half goes on to the end of the band
     ends = np.array([line.time[-1] for line in lines])
