@@ -159,6 +159,15 @@ def parse_json(text: str | bytes) -> Any:
         raise ValueError("nested too deep") from None
 
 
+def read_object(path: Path) -> dict[str, Any] | None:
+    """Return the object that a JSON file holds; None where it holds none."""
+    try:
+        document = parse_json(read_regular(path, most=MAX_TABLE))
+    except (FileNotFoundError, ValueError):
+        return None
+    return document if isinstance(document, dict) else None
+
+
 YES_NO = ("no", "yes")
 """Cells of False and True."""
 

@@ -33,8 +33,8 @@ def check(study: Path) -> None:
 
         problems = [each for checker in _CHECKERS for each in checker(protocol, paths)]
         # What only may happen is for a study of which all else is right.
-        for note in torque_notes(protocol) if not problems else ():
-            notes.append(f"{paths.protocol}: {note}")
+        of_models = () if problems else torque_notes(protocol)
+        notes += [f"{paths.protocol}: {note}" for note in of_models]
         with contextlib.suppress(MasrelError):  # a checker has said it
             notes += concealment_notes(protocol, paths)
         with contextlib.suppress(MasrelError):
@@ -76,8 +76,7 @@ def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
         check_backend(protocol)
     except ParameterError as error:
         yield f"{study.protocol}: {error}"
-    for problem in torque_problems(protocol):
-        yield f"{study.protocol}: {problem}"
+    yield from (f"{study.protocol}: {each}" for each in torque_problems(protocol))
 
 
 def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
@@ -85,9 +84,8 @@ def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
         return
     from masrel.lab.verification import verify_sessions
 
-    for finding in verify_sessions(study, protocol).findings:
-        if finding.weight == "broken":
-            yield finding.message
+    findings = verify_sessions(study, protocol).findings
+    yield from (each.message for each in findings if each.weight == "broken")
 
 
 def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:

@@ -5,11 +5,14 @@ Every draw and amendment leaves a copy of the protocol in the log of the study.
 
 import hashlib
 import json
+import sys
+from bisect import bisect_left
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from itertools import chain, pairwise, takewhile
 from operator import itemgetter
 from pathlib import Path
@@ -138,41 +141,69 @@ def _copy_of(log: Path, event: Event) -> Protocol:
     return copy
 
 
+# after these there may be less of what else only grows: of grades, answers, raters
+_TAKE_BACK = ("restarted", "answer-correction", "excluded", "included")
+
+
 def is_of_earlier(
-    study: StudyPaths, protocol: Protocol, is_made: Callable[[Protocol], bool | None]
+    study: StudyPaths,
+    protocol: Protocol,
+    compare: Callable[[Protocol], tuple[object, int]],
+    amount: int | None,
 ) -> bool:
     """Say whether something was made of a state that the record had earlier.
 
-    `is_made` says so of a protocol, and of what logs say while it is called, the latest
-    first; None, that the record had too little by then, and so at any earlier time.
+    `compare` makes it of a protocol, and of what logs say while it is called. It
+    returns how that differs, if it does, and how much it has of something that grows as
+    events are logged. Only states with `amount` of that are tried, or all for None.
     """
-
-    def answer(then: Protocol) -> bool | None:
-        with suppress(MasrelError):
-            return is_made(then)
-        return False
-
-    versions = {protocol_hash(each): each for each, _ in plan_versions(study)}
-    for then in ({protocol_hash(protocol): protocol} | versions).values():
-        answers = (as_then(lines, answer, then) for lines in _states(study, protocol))
-        if any(takewhile(lambda answer: answer is not None, answers)):
-            return True
-    return False
-
-
-def _states(study: StudyPaths, protocol: Protocol) -> Iterator[Mapping[str, int]]:
-    # how many lines logs have, and had before each event, the last one first
     logs = map(timed_events, [*study.conduct_logs(), *study.logs()])
     timed = sorted(chain(*logs), key=itemgetter(0))
-    n_lines = dict(Counter(str(log) for _, log, _ in timed))
-    yield n_lines
-    for _, log, event in reversed(timed):
-        n_lines[str(log)] -= 1
-        if event.kind == "unblinded":  # a sealed study was sealed before
-            n_lines |= {
-                str(study.schedule_file(*place)): 0 for place in protocol.rater_sessions
-            }
-        yield n_lines
+    less = [n for n, (*_, event) in enumerate(timed, 1) if _takes_back(event)]
+
+    def made(then: Protocol, n_events: int) -> tuple[object, int]:
+        lines = _lines_after(timed, n_events, study, protocol)
+        with suppress(MasrelError):
+            return as_then(lines, compare, then)
+        begun = (lines.get(str(study.log_file(*of))) for of in then.rater_sessions)
+        return True, sys.maxsize if any(begun) else -1  # too much, or nothing yet
+
+    def is_in(stretch: range, then: Protocol) -> bool:
+        first, of = 0, partial(made, then)
+        # by another scale a grade may be wrong until it is corrected
+        wanted = amount if then.scale == protocol.scale else None
+        if wanted is not None:
+            first = bisect_left(stretch, wanted, key=lambda n_events: of(n_events)[1])
+        tried = takewhile(lambda it: wanted in (None, it[1]), map(of, stretch[first:]))
+        return any(not difference for difference, _ in tried)
+
+    versions = {protocol_hash(each): each for each, _ in plan_versions(study)}
+    return any(
+        is_in(range(*stretch), then)
+        for then in ({protocol_hash(protocol): protocol} | versions).values()
+        for stretch in pairwise([0, *less, len(timed) + 1])
+    )
+
+
+def _takes_back(event: Event) -> bool:
+    is_correction = event.kind == "correction" and event.fields.get("grade") is None
+    return is_correction or event.kind in _TAKE_BACK
+
+
+def _lines_after(
+    timed: Sequence[tuple[str, Path, Event]],
+    n_events: int,
+    study: StudyPaths,
+    protocol: Protocol,
+) -> dict[str, int]:
+    # in how many lines each log says what it said after so many events
+    lines = dict.fromkeys((str(log) for _, log, _ in timed), 0)
+    lines |= Counter(str(log) for _, log, _ in timed[:n_events])
+    if any(event.kind == "unblinded" for *_, event in timed[n_events:]):
+        # a sealed study was sealed before
+        sealed = (study.schedule_file(*of) for of in protocol.rater_sessions)
+        lines |= dict.fromkeys(map(str, sealed), 0)
+    return lines
 
 
 def _between(before: Any, after: Any, event: Event | None) -> Iterator[PlanChange]:

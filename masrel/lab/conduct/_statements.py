@@ -141,8 +141,8 @@ def record_note(
     known = stated(**known)
     for name in _CHOICES.keys() & known.keys():
         check_choice(name, known[name], _CHOICES[name])
-    for name in {"on", "onset"} & known.keys():
-        known[name] = past_day(name, known[name], now)
+    days = {"on", "onset"} & known.keys()
+    known |= {name: past_day(name, known[name], now) for name in days}
     append_event(study, protocol, "noted", {**asdict(note), **known}, now=now)
 
 

@@ -130,9 +130,11 @@ def model_document(
     }
     constants |= {key: getattr(joint, key) for key in READING_KEYS}
     defaults = {field.name: field.default for field in fields(joint)}
-    for key, (name, factor) in VARIANT_KEYS.items():
-        if (value := getattr(joint, name)) != defaults[name]:
-            constants[key] = value * factor
+    constants |= {
+        key: value * factor
+        for key, (name, factor) in VARIANT_KEYS.items()
+        if (value := getattr(joint, name)) != defaults[name]
+    }
     document: Document = {
         "format": FORMAT,
         "made_from": made_from,

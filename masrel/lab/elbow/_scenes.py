@@ -130,8 +130,7 @@ class Columns:
                 )
                 rows.update(map(int, extremes))
         full = SimpleNamespace(**{**_DEFAULTS[self.kind], **self.columns})
-        for margin in _MARGINS[self.kind](full):
-            rows.add(int(np.argmin(margin)))
+        rows |= {int(np.argmin(margin)) for margin in _MARGINS[self.kind](full)}
         return sorted(rows)
 
     def __len__(self) -> int:

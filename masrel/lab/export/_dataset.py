@@ -257,9 +257,11 @@ def _raters_table(
     # of ratings that were published nobody knows how they came about
     known = [*_OF_RATERS] if paths.logs() else ["rater", "site"]
     described = {name: _OF_RATERS[name] for name in known}
-    for name, field in protocol.rater_fields.items():
-        if name not in hidden:
-            described[name] = column(field.title or name, field.unit, field.choices)
+    described |= {
+        name: column(field.title or name, field.unit, field.choices)
+        for name, field in protocol.rater_fields.items()
+        if name not in hidden
+    }
     return DataTable(
         columns=described,
         rows=[{name: row[name] for name in described} for row in rows],

@@ -379,12 +379,12 @@ def _filled_row(
         )
     about: When = "presentation" if isinstance(place, int) else place
     for when, columns in form.questions.items():
-        for column in columns if when != about else ():
-            if row[column.column]:
-                problems.append(
-                    f"{where}: {column.column}: needed an empty cell in this row, got "
-                    f"{shortened(row[column.column])!r}"
-                )
+        problems += [
+            f"{where}: {column.column}: needed an empty cell in this row, got "
+            f"{shortened(row[column.column])!r}"
+            for column in columns
+            if when != about and row[column.column]
+        ]
     return FilledRow(
         number=row.number,
         place=place,

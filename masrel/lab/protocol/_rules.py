@@ -66,9 +66,13 @@ def _broken(*rules: tuple[object, str]) -> Iterator[str]:
 
 
 def _again(names: Sequence[str], where: str, needs: str) -> Iterator[str]:
-    for index, (name, is_again) in enumerate(zip(names, repeated(names), strict=True)):
-        if is_again:
-            yield f"{where}[{index}]: needed {needs}, got {got(name)} again"
+    return (
+        f"{where}[{index}]: needed {needs}, got {got(name)} again"
+        for index, (name, is_again) in enumerate(
+            zip(names, repeated(names), strict=True)
+        )
+        if is_again
+    )
 
 
 def _chosen(table: msgspec.Struct, *keys: str) -> list[str]:
@@ -513,9 +517,11 @@ def model_rules(model: Model, elbow: ElbowConstants) -> Iterator[str]:
         yield from _tone_keys(model)
     else:
         annotations = {info.name: info.type for info in msgspec.structs.fields(Model)}
-        for key in _ELBOW_KEYS:
-            if getattr(model, key) is None:
-                yield f"{key}: needed {needed(annotations[key])}, got none"
+        yield from (
+            f"{key}: needed {needed(annotations[key])}, got none"
+            for key in _ELBOW_KEYS
+            if getattr(model, key) is None
+        )
         if model.parameters:
             yield (
                 f"parameters: needed a kind of model that has some, got "

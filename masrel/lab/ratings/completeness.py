@@ -245,12 +245,12 @@ def _of_sessions(
 
 
 def _of_days(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:
-    for event in _read(log)[0]:
-        if event.kind == "day-correction":
-            yield (
-                f"{_name(study, log)}: the session was held on {event.fields['on']}, "
-                f"as was corrected on {event.time_utc[:10]}{_by_whom(event, include)}."
-            )
+    return (
+        f"{_name(study, log)}: the session was held on {event.fields['on']}, as was "
+        f"corrected on {event.time_utc[:10]}{_by_whom(event, include)}."
+        for event in _read(log)[0]
+        if event.kind == "day-correction"
+    )
 
 
 def _of_skips(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:

@@ -25,6 +25,7 @@ from masrel.lab.conduct._plan_versions import is_of_earlier
 from masrel.lab.progress import raters_csv
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings.answers import (
+    ANSWER_COLUMNS,
     GivenAnswer,
     answers_csv,
     answers_from_logs,
@@ -34,6 +35,7 @@ from masrel.lab.ratings.study_file import InPerson, read_in_person, read_study_r
 from masrel.lab.ratings.table import (
     _FORMAT,
     _NEEDED_TIME,
+    RATING_COLUMNS,
     Ratings,
     _is_utc,
     _texts,
@@ -41,8 +43,6 @@ from masrel.lab.ratings.table import (
 )
 from masrel.lab.run._state import FROM_PAPER, FROM_PERSONS, SessionState, read_session
 from masrel.lab.schedule import Schedule, check_schedule, read_schedule
-
-_N_HEAD = 2  # lines at the head of a table that not every format has
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,32 +203,51 @@ def _table_differences(
     It is that of ratings, of answers or of raters; one that is not there differs in
     nothing.
     """
-    # all that a table of the same logs has ever been
-    texts: Callable[[Protocol], Iterable[str]] = {
-        study.ratings_file: lambda then: _texts(
-            ratings_from_logs(study, then, check_recordings=False)
-        ),
-        study.answers_file: lambda then: [answers_csv(answers_from_logs(study, then))],
-        study.raters_file: lambda then: [raters_csv(study, then)],
-    }[path]
+    texts, place, steps = _tables(study)[path]
     if not path.is_file():
         return False, []
     text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
 
-    def is_made(then: Protocol) -> bool | None:
-        known = iter(texts(then))
-        n_more = (first := next(known)).count("\n") - text.count("\n")
-        if n_more < 0:
-            return None
-        # more at the head, or rows that came later
-        return n_more <= _N_HEAD and (text == first or text in known)
+    def amount(text: str) -> int:
+        # every step that a cell of the column has come to
+        rows = (row.split(",") for row in text.split("\n"))
+        cells = [row[place] for row in rows if len(row) > place]
+        return sum(cell not in step for step in steps for cell in cells)
 
-    if is_made(protocol):
+    def compare(then: Protocol) -> tuple[bool, int]:
+        known = [*texts(then)]
+        return text not in known, amount(known[0])
+
+    if text in texts(protocol):
         return False, []
-    if is_of_earlier(study, protocol, is_made):
+    if is_of_earlier(study, protocol, compare, amount(text)):
         return True, ["needed what the logs say, got what they said earlier"]
     newest = _FORMAT if path == study.ratings_file else 1
     return False, [*_line_differences(text, [*texts(protocol)], newest)]
+
+
+def _tables(
+    study: StudyPaths,
+) -> dict[Path, tuple[Callable[[Protocol], Iterable[str]], int, list[list[str]]]]:
+    # of each table: all that one of the same logs has ever been; which column is filled
+    # as a study goes on, with what it has before each step
+    return {
+        study.ratings_file: (
+            lambda then: _texts(ratings_from_logs(study, then, check_recordings=False)),
+            RATING_COLUMNS.index("grade"),
+            [["NA"]],
+        ),
+        study.answers_file: (
+            lambda then: [answers_csv(answers_from_logs(study, then))],
+            ANSWER_COLUMNS.index("answer"),
+            [[""]],
+        ),
+        study.raters_file: (
+            lambda then: [raters_csv(study, then)],
+            2,
+            [["planned"], ["planned", "begun"]],
+        ),
+    }
 
 
 def _line_differences(text: str, known: list[str], newest: int) -> Iterator[str]:

@@ -178,8 +178,7 @@ def conduct_section(material: Material) -> Iterator[Content]:
         yield _corrections_table(material, conduct)
     if conduct.changes:
         yield _changes_table(material, conduct)
-    for text in conduct.remarks:
-        yield Paragraph(text=text)
+    yield from (Paragraph(text=text) for text in conduct.remarks)
     if left_out := "; ".join(_left_out(material, conduct)):
         yield Paragraph(
             text=f"Left out: {left_out}. masrel report shows each with --include and "

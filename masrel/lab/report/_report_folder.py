@@ -33,6 +33,7 @@ from masrel.lab._study_files import (
     MANIFEST,
     MAX_TABLE,
     UNFINISHED,
+    read_object,
     read_regular,
     regular,
 )
@@ -147,9 +148,8 @@ def _differs(path: Path, hashes: Collection[str]) -> bool:
 def _documents(folder: Path) -> Iterator[dict[str, Any]]:
     # its manifest, and the list of a report that was cut off, where there are any
     for name in (MANIFEST, UNFINISHED):
-        with contextlib.suppress(OSError, ValueError):
-            document = json.loads(read_regular(folder / name, most=MAX_TABLE))
-            if isinstance(document, dict):
+        with contextlib.suppress(OSError):
+            if (document := read_object(folder / name)) is not None:
                 yield document
 
 

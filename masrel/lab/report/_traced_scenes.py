@@ -223,13 +223,16 @@ def scene_text(document: dict[str, Any], title: str) -> str:
         for event in document.get("events", ())  # of another kind of joint
     ]
     values = [("peak torque", document["peak_torque_nm"], "N·m")]
-    for key, name, unit in SCENE_OUTPUTS.values():
-        if key in document:
-            values.append((name, document[key], unit))
-    for key, place, unit in _PLACES:
-        for row in document.get(key, ()):
-            name = f"torque at {significant(row[place])} {unit}"
-            values.append((name, row["torque_nm"], "N·m"))
+    values += [
+        (name, document[key], unit)
+        for key, name, unit in SCENE_OUTPUTS.values()
+        if key in document
+    ]
+    values += [
+        (f"torque at {significant(row[place])} {unit}", row["torque_nm"], "N·m")
+        for key, place, unit in _PLACES
+        for row in document.get(key, ())
+    ]
     lines += [
         f"{name} none: the stretch has no catch"
         if value is None

@@ -467,12 +467,13 @@ def sheet_differences(
 ) -> tuple[SheetDifference, ...]:
     """Return in what the last second entry of a sheet differs from the logs."""
     first: dict[tuple[str | None, str], object] = {
-        (code, "grade"): grade for code, grade in state.grades.items()
+        **{(code, "grade"): grade for code, grade in state.grades.items()},
+        **{(None, ".".join(asked)): answer for asked, answer in of_study.items()},
+        **{
+            (code, f"{questionnaire}.{question}"): answer
+            for (questionnaire, question, code), answer in state.answers.items()
+        },
     }
-    for (questionnaire, question), answer in of_study.items():
-        first[None, f"{questionnaire}.{question}"] = answer
-    for (questionnaire, question, code), answer in state.answers.items():
-        first[code, f"{questionnaire}.{question}"] = answer
     differences = [
         SheetDifference(
             code=code,

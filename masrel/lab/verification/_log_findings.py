@@ -342,8 +342,9 @@ def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Fi
     OSError
         If a log cannot be read.
     """
-    logs = {log.relative_to(study.root).as_posix(): log for log in _logs(study)}
-    hashes: dict[str, tuple[str, ...]] = {}
+    hashes = {
+        log.relative_to(study.root).as_posix(): line_hashes(log) for log in _logs(study)
+    }
     for anchor in anchors:
         path = study.root / anchor.log
         if (
@@ -354,11 +355,9 @@ def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Fi
             )
         ):
             continue
-        if anchor.log not in logs:
+        if anchor.log not in hashes:
             yield broken(path, "needed the log that an anchor names, got no file")
             continue
-        if anchor.log not in hashes:
-            hashes[anchor.log] = line_hashes(logs[anchor.log])
         of_log = hashes[anchor.log]
         if len(of_log) < anchor.line:
             yield broken(

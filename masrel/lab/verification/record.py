@@ -4,7 +4,7 @@ import hashlib
 import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain, starmap
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,10 @@ from masrel.lab._study_files import (
     CUT_OFF,
     MANIFEST,
     MAX_RECORDING,
-    MAX_TABLE,
     format_problem,
     is_cut_off,
     leaves,
-    parse_json,
+    read_object,
     read_once,
     read_regular,
 )
@@ -316,7 +315,7 @@ def _numbers_findings(
     # of an analysis, that of a report with what the manifest says that this is made of
     from masrel.lab.analysis._results import ANALYSIS_FORMAT
 
-    numbers = _document(path)
+    numbers = read_object(path)
     problem = (
         "needed a JSON object, got none"
         if numbers is None
@@ -325,48 +324,74 @@ def _numbers_findings(
     if numbers is None or problem is not None:
         yield broken(path, str(problem))
         return
-    version, inputs = numbers.get("masrel_version"), report or numbers.get("inputs")
-    made_of = inputs if isinstance(inputs, Mapping) else {}
-    if version != masrel.__version__:
+    if (version := numbers.get("masrel_version")) != masrel.__version__:
         yield doubt(
             path,
             f"made by masrel {version}, not rebuilt by this, {masrel.__version__}: "
             "only what it was made from is looked at",
         )
-        numbers = {}
+    made_of = report or numbers.get("inputs")
+    of = _Numbers(
+        study=study,
+        document=numbers,
+        made_of=made_of if isinstance(made_of, Mapping) else {},
+        is_of_report=report is not None,
+        computed=computed,
+    )
+    difference, _ = of.compare(protocol)
+    if difference is None:
+        return
+    is_earlier = is_of_earlier(study, protocol, of.compare, of.n_presentations)
+    in_person = of.tried.get(str(of.made_of.get("protocol_sha256")), _OTHER)
+    is_known = study.logs() and in_person == of.made_of.get("in_person_sha256")
+    unknown = "" if is_known else ", which no log has: it may have been made up"
     place, verb = (
         (path, "analyze") if report is None else (path.with_name(MANIFEST), "report")
     )
-    seen: dict[str, object] = {}  # protocols that were tried, with what else was there
-
-    def difference(then: Protocol) -> str | None:
-        # an earlier version may have written ratings in another format
-        former = made_of.get("ratings_sha256")
-        material, inputs = _material(study, then, former)
-        seen[inputs["protocol_sha256"]] = inputs.get("in_person_sha256")
-        beside = {"conduct_sha256": report and conduct_hash(study)}
-        if inputs | {k: v for k, v in beside.items() if v} != made_of:
-            return _OTHER
-        return (
-            _unlike(numbers, _leaves(study, material, inputs, computed))
-            if numbers
-            else None
-        )
-
-    now, of = difference(protocol), str(made_of.get("protocol_sha256"))
-    if now is None:
-        return
-    # of what is made of the record as it is now, all else is another's
-    answers = {None: True, _OTHER: False if now == _OTHER else None}
-    is_earlier = is_of_earlier(
-        study, protocol, lambda then: answers.get(difference(then), False)
-    )
-    is_known = study.logs() and seen.get(of, _OTHER) == made_of.get("in_person_sha256")
-    unknown = "" if is_known else ", which no log has: it may have been made up"
+    words = _EARLIER if is_earlier else difference + unknown
     yield (broken if is_known and not is_earlier else stale)(
-        place,
-        f"{_EARLIER if is_earlier else now + unknown}; masrel {verb} makes it anew",
+        place, f"{words}; masrel {verb} makes it anew"
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Numbers:
+    """An analysis, and what its file, or the manifest of its report, says it is of."""
+
+    study: StudyPaths
+    document: Mapping[str, object]
+    made_of: Mapping[str, object]
+    is_of_report: bool  # which is of what the log of the study says, too
+    computed: dict[str, dict[str, str]]
+    # in-person grades beside each protocol that was tried, by hashes
+    tried: dict[str, object] = field(default_factory=dict)
+
+    @property
+    def n_presentations(self) -> int | None:
+        """Of how many presentations it is, as it says; None where it does not."""
+        match self.document:
+            case {"presentations": None}:
+                return 0
+            case {"presentations": {"n_presentations": int(n_presentations)}}:
+                return n_presentations
+        return None
+
+    def compare(self, then: Protocol) -> tuple[str | None, int]:
+        """Return how it differs from what comes out, and of how many presentations."""
+        # an earlier version may have written ratings in another format
+        former = self.made_of.get("ratings_sha256")
+        material, inputs = _material(self.study, then, former)
+        self.tried[inputs["protocol_sha256"]] = inputs.get("in_person_sha256")
+        ratings = material["ratings"].without(excluded_raters(self.study))
+        known = [row for row in ratings.rows if row.n_stretches is not None]
+        n = 0 if material["ratings"].is_sealed else len(known)
+        beside = {"conduct_sha256": self.is_of_report and conduct_hash(self.study)}
+        if inputs | {k: v for k, v in beside.items() if v} != self.made_of:
+            return _OTHER, n
+        if self.document.get("masrel_version") != masrel.__version__:
+            return None, n
+        needed = _leaves(self.study, material, inputs, self.computed)
+        return _unlike(self.document, needed), n
 
 
 def _unlike(numbers: Mapping[str, object], needed: Mapping[str, str]) -> str | None:
@@ -445,7 +470,7 @@ def _report_findings(
     computed: dict[str, dict[str, str]],
 ) -> Iterator[Finding]:
     # of the pages and assets that a report consists of, and what it was made from
-    document = _document(manifest) or {}
+    document = read_object(manifest) or {}
     files, inputs = document.get("files"), document.get("inputs")
     if not isinstance(files, dict) or not isinstance(inputs, dict):
         yield broken(manifest, "needed the manifest of a report, got none")
@@ -480,11 +505,3 @@ def _file_findings(manifest: Path, files: Mapping[str, object]) -> Iterator[Find
 
 def _sha256(path: Path) -> str:
     return hashlib.sha256(read_regular(path, most=MAX_RECORDING)).hexdigest()
-
-
-def _document(path: Path) -> dict[str, object] | None:
-    try:
-        document = parse_json(read_regular(path, most=MAX_TABLE))
-    except (FileNotFoundError, ValueError):
-        return None
-    return document if isinstance(document, dict) else None

@@ -6,6 +6,8 @@ import json
 import shlex
 import shutil
 from collections.abc import Callable
+from cProfile import Profile
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -140,9 +142,10 @@ def called(*commands: str) -> Callable[[StudyPaths], object]:
     return lambda of: [run(*shlex.split(each.format(of.root))) for each in commands]
 
 
-def corrected(study: StudyPaths) -> None:
+def corrected(study: StudyPaths, grade: str | None = "4") -> None:
     given = first(events(study.root / SESSION), "grade")
-    grade = "4" if given["grade"] != "4" else "0"
+    if given["grade"] == grade:
+        grade = "0"
     of = {"code": str(given["code"]), "who": "me", "why": "a slip"}
     record_correction(
         study, read_protocol(study.protocol), "R1", "test", grade=grade, **of
@@ -288,6 +291,32 @@ def test_what_is_out_of_date_is_stale_and_is_made_anew(
     for verb in ("ratings", "report"):
         run(verb, str(study.root))
     run("verify", str(study.root))
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        partial(corrected, grade=None),
+        called("record exclude {0} --rater R2 --who Kim --why late"),
+    ],
+)
+def test_what_was_made_of_more_than_there_is_now_is_stale(
+    study: StudyPaths, later: Callable[[StudyPaths], object]
+) -> None:
+    later(study)
+    called(*["record note {0} cut --who Kim"] * 40)(study)
+    assert [f.weight for f in verify_study(study).findings] == ["stale"] * 3
+
+
+def test_a_state_that_the_record_had_is_found_by_halves(study: StudyPaths) -> None:
+    for _ in range(40):
+        corrected(study)
+    without_line(-1)(study.ratings_file)
+    profile = Profile()
+    findings = profile.runcall(verify_study, study).findings
+    assert {f.weight for f in findings if f.path == study.ratings_file} == {"broken"}
+    calls = {getattr(e.code, "co_name", ""): e.callcount for e in profile.getstats()}
+    assert calls["ratings_from_logs"] < 30  # of 60 states, for three files
 
 
 def test_a_rehearsal_of_another_number_is_found(study: StudyPaths) -> None:

@@ -269,10 +269,11 @@ def _start(steps: Sequence[Step], law: Law) -> dict[str, float]:
     start = dict.fromkeys(QUANTITIES, math.nan)
     start |= {e.name: e.value for step in steps for e in step.estimates}
     has_catch = not math.isnan(start["catch_torque_constant"])
-    for name in ARM_QUANTITIES:
-        if name in law.fitted and (has_catch or name not in _FLOORS):
-            start[name] = float(getattr(law, name))
-    return start
+    return start | {
+        name: float(getattr(law, name))
+        for name in ARM_QUANTITIES
+        if name in law.fitted and (has_catch or name not in _FLOORS)
+    }
 
 
 def _spreads(steps: Sequence[Step]) -> dict[str, float]:
