@@ -32,6 +32,12 @@ if TYPE_CHECKING:
         effective_number,
     )
     from masrel.judges.power import JudgePlan, judge_plan
+    from masrel.judges.preferences import (
+        BradleyTerry,
+        PositionBias,
+        bradley_terry,
+        position_bias,
+    )
     from masrel.judges.rates import (
         RateEstimate,
         RateEstimates,
@@ -45,6 +51,7 @@ if TYPE_CHECKING:
 __all__ = [
     "EPSILONS",
     "AlternativeAnnotatorTest",
+    "BradleyTerry",
     "DawidSkene",
     "DawidSkeneIntervals",
     "EffectiveNumber",
@@ -53,6 +60,7 @@ __all__ = [
     "JudgeDifference",
     "JudgePlan",
     "PairedTest",
+    "PositionBias",
     "RateEstimate",
     "RateEstimates",
     "Score",
@@ -61,6 +69,7 @@ __all__ = [
     "advantage",
     "advantage_differences",
     "alternative_annotator_test",
+    "bradley_terry",
     "corrected_rate",
     "dawid_skene",
     "dawid_skene_intervals",
@@ -68,6 +77,7 @@ __all__ = [
     "judge_plan",
     "label_allocation",
     "labels_needed",
+    "position_bias",
     "prediction_powered_mean",
     "rate_estimates",
     "reference_difference",
@@ -77,6 +87,7 @@ __all__ = [
 _HOMES = {
     "EPSILONS": "annotators",
     "AlternativeAnnotatorTest": "annotators",
+    "BradleyTerry": "preferences",
     "DawidSkene": "latent_classes",
     "DawidSkeneIntervals": "latent_classes",
     "EffectiveNumber": "latent_classes",
@@ -85,6 +96,7 @@ _HOMES = {
     "JudgeDifference": "annotators",
     "JudgePlan": "power",
     "PairedTest": "_paired",
+    "PositionBias": "preferences",
     "RateEstimate": "rates",
     "RateEstimates": "rates",
     "Score": "annotators",
@@ -93,6 +105,7 @@ _HOMES = {
     "advantage": "annotators",
     "advantage_differences": "annotators",
     "alternative_annotator_test": "annotators",
+    "bradley_terry": "preferences",
     "corrected_rate": "rates",
     "dawid_skene": "latent_classes",
     "dawid_skene_intervals": "latent_classes",
@@ -100,6 +113,7 @@ _HOMES = {
     "judge_plan": "power",
     "label_allocation": "rates",
     "labels_needed": "rates",
+    "position_bias": "preferences",
     "prediction_powered_mean": "rates",
     "rate_estimates": "rates",
     "reference_difference": "annotators",
