@@ -264,7 +264,7 @@ def _facts(names: Sequence[str], wrong: set[int], named: set[int]) -> dict[str, 
         rest and few(out)
     )
     is_gold = len(out) == 1 and called_gold(out[0])
-    held = f"; as --reference{few(out)} judge and diagnose hold the others against it"
+    held = f"; masrel diagnose --reference{few(out)} holds the others against it"
     return {
         "columns": listed(out, _SHOWN),
         "why": "name" if wrong <= named else _APART,

@@ -324,6 +324,7 @@ TABLE: dict[str, Asked] = {
         tries={
             "--ignore gold": "11 21 22 11",
             "--raters Kim,Lee": "11 21 22 11",
+            "masrel diagnose --reference gold": None,
         },
     ),
     "nothing in common": Asked(
