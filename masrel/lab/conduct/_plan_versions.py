@@ -171,10 +171,10 @@ def is_of_earlier(
     def is_in(stretch: range, then: Protocol) -> bool:
         first, of = 0, partial(made, then)
         # by another scale a grade may be wrong until it is corrected
-        wanted = amount if then.scale == protocol.scale else None
-        if wanted is not None:
-            first = bisect_left(stretch, wanted, key=lambda n_events: of(n_events)[1])
-        tried = takewhile(lambda it: wanted in (None, it[1]), map(of, stretch[first:]))
+        target = amount if then.scale == protocol.scale else None
+        if target is not None:
+            first = bisect_left(stretch, target, key=lambda n_events: of(n_events)[1])
+        tried = takewhile(lambda it: target in (None, it[1]), map(of, stretch[first:]))
         return any(not difference for difference, _ in tried)
 
     versions = {protocol_hash(each): each for each, _ in plan_versions(study)}

@@ -59,7 +59,7 @@ class GivenAnswer:
 
 _FORMAT = 1  # version of a table of answers
 
-ANSWER_COLUMNS = tuple(field.name for field in fields(GivenAnswer))
+_COLUMNS = tuple(field.name for field in fields(GivenAnswer))
 
 
 def answers_from_logs(study: StudyPaths, protocol: Protocol) -> tuple[GivenAnswer, ...]:
@@ -203,10 +203,8 @@ def answers_csv(answers: tuple[GivenAnswer, ...]) -> str:
     is_simulated = any(each.grades_from not in of_persons for each in answers)
     head = ["SIMULATED: not answers of persons."] * is_simulated
     head += ["Answers to questionnaires, one row a question; empty is missing."]
-    rows = ((getattr(each, name) for name in ANSWER_COLUMNS) for each in answers)
-    return table_csv(
-        ANSWER_COLUMNS, rows, head=[*head, f"format: {_FORMAT}"], absent=""
-    )
+    rows = ((getattr(each, name) for name in _COLUMNS) for each in answers)
+    return table_csv(_COLUMNS, rows, head=[*head, f"format: {_FORMAT}"], absent="")
 
 
 def write_answers(
@@ -255,7 +253,7 @@ def read_answers(path: Path, protocol: Protocol) -> tuple[GivenAnswer, ...]:
         answer that it cannot have. The message lists up to 20 problems.
     """
     rows = _read_rows(path)
-    _check_columns(rows, ANSWER_COLUMNS)
+    _check_columns(rows, _COLUMNS)
     questions = {
         (questionnaire.id, question.id): question
         for questionnaire in protocol.questionnaires

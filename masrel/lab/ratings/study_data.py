@@ -25,7 +25,7 @@ from masrel.lab.conduct._plan_versions import is_of_earlier
 from masrel.lab.progress import raters_csv
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings.answers import (
-    ANSWER_COLUMNS,
+    _COLUMNS,
     GivenAnswer,
     answers_csv,
     answers_from_logs,
@@ -239,7 +239,7 @@ def _tables(
         ),
         study.answers_file: (
             lambda then: [answers_csv(answers_from_logs(study, then))],
-            ANSWER_COLUMNS.index("answer"),
+            _COLUMNS.index("answer"),
             [[""]],
         ),
         study.raters_file: (

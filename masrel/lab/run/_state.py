@@ -468,7 +468,7 @@ def sheet_differences(
     """Return in what the last second entry of a sheet differs from the logs."""
     first: dict[tuple[str | None, str], object] = {
         **{(code, "grade"): grade for code, grade in state.grades.items()},
-        **{(None, ".".join(asked)): answer for asked, answer in of_study.items()},
+        **{(None, ".".join(key)): answer for key, answer in of_study.items()},
         **{
             (code, f"{questionnaire}.{question}"): answer
             for (questionnaire, question, code), answer in state.answers.items()
