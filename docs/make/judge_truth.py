@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.judges import DawidSkeneIntervals, dawid_skene_intervals
+from masrel.judges import dawid_skene_intervals
 
 DOCS = Path(__file__).parents[1]
 TABLE, PAGE = DOCS / "judges_truth.csv", DOCS / "judges_evidence.md"
-HEADING = "## Who is right: Dawid and Skene on simulated ratings"
+BEGIN, END = "<!-- truth -->\n", "<!-- end of the truth -->\n"
 N_SETS, N_RESAMPLES, SEED = 500, 640, 39
 # items of which a share is hard: raters are wrong there in 7 of 10 grades, together
 HARD, WRONG_ON_HARD = 0.2, 0.7
@@ -55,7 +55,7 @@ CELLS = (
 HEAD = (
     *("n_items", "n_raters", "accuracy", "shares", "errors", "n_sets"),
     *("coverage_shares", "coverage_right", "coverage_wrong", "width_shares"),
-    *("width_right", "items_right", "votes_right", "switched"),
+    *("width_right", "items_right", "votes_right", "warned"),
 )
 
 
@@ -94,13 +94,8 @@ def measure(cell: Cell, rng: np.random.Generator) -> list[float]:
         width[:, right].mean(),
         (intervals.fit.posterior.argmax(axis=1) == truth).mean(),
         of_votes.mean(),
-        is_warned(intervals),
+        len(intervals.notes) > len(intervals.fit.notes),
     ]
-
-
-def is_warned(intervals: DawidSkeneIntervals) -> bool:
-    """Whether the result says that classes exchanged places."""
-    return any("exchanged" in note for note in intervals.notes)
 
 
 def row(number: int) -> list[str]:
@@ -113,12 +108,12 @@ def row(number: int) -> list[str]:
 
 
 def section(rows: list[list[str]]) -> str:
-    """Return the section of the page."""
+    """Return the section of the page: what is simulated, and a line a cell."""
     titles = "items | raters | accuracy | shares | errors | π | θ, right | θ, wrong"
     titles += " | items right | by votes | warned"
     shown = [[*of[:5], *of[6:9], *of[11:]] for of in rows]
-    lines = [f"| {titles} |", "|" + "---|" * 11]
-    return "\n".join([*lines, *(f"| {' | '.join(of)} |" for of in shown)])
+    lines = [TEXT, f"| {titles} |", "|" + " --- |" * 11]
+    return "\n".join([*lines, *(f"| {' | '.join(of)} |" for of in shown), ""])
 
 
 def main() -> None:
@@ -127,9 +122,31 @@ def main() -> None:
         rows.append(row(number))
         print(*rows[-1], flush=True)
     text = io.StringIO()
-    csv.writer(text, lineterm="\n").writerows([HEAD, *rows])
+    csv.writer(text, lineterminator="\n").writerows([HEAD, *rows])
     TABLE.write_text(text.getvalue(), encoding="utf-8")
-    print(section(rows))
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    page = before + BEGIN + section(rows) + END + rest.partition(END)[2]
+    PAGE.write_text(page, encoding="utf-8")
+
+
+TEXT = """\
+500 sets of ratings a row, by raters of one accuracy whose errors fall on the other
+classes alike often. Shown are the shares of the 95 % intervals that hold the true π,
+the chances of the right grade and those of each wrong one; of items whose most probable
+class is the true one, and the same of the majority vote (a tie is split); and of sets
+with a warning. An interval takes 640 draws.
+
+- Where raters are right in 8 of 10 or more, intervals hold in 93 or more of 100, but
+  for π of 200 items by three raters, and right grades of 50 items in four classes (92).
+- Where they are right in 6 or 7 of 10 and tell the classes apart but little, intervals
+  are too short, down to 81 of 100. Of these sets 79 in 100 or more have a warning.
+- There the majority vote finds the class more often than the model does, and so it does
+  with few items: with raters of one accuracy, the model has nothing to weigh.
+- **Where raters err together, nothing shows it.** A fifth of the items are hard, and
+  every rater is wrong on 7 of 10 of these; in all, each is right in 8 of 10, and five
+  are worth two. The intervals of errors hold the truth in 38 of 100 sets, and no set is
+  warned of.
+"""
 
 
 if __name__ == "__main__":

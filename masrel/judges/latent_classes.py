@@ -34,6 +34,7 @@ _NO_ITEM = 1e-6  # ratings of a class below which a rater has met none of it
 _SMALLEST = 1e-300  # probability, so that the logarithm of 0 is a number
 _PRIOR, _PRIOR_RIGHT = 0.5, 1.0  # of each cell, and so much more of the right one
 _MANY_SWITCHED = 0.01  # share of draws
+_CERTAIN = 0.87  # mean probability of an item's class; see docs/judges_evidence.md
 _N_CHAINS, _BURN_IN = 16, 100
 
 
@@ -473,7 +474,8 @@ def dawid_skene_intervals(
     UndefinedStatisticWarning
         If the ratings do not identify the model.
     SmallSampleWarning
-        If classes exchanged places in more than one draw of a hundred.
+        If the class of an item is uncertain, with a mean probability below .87, or
+        classes exchanged places in more than one draw of a hundred.
 
     Notes
     -----
@@ -520,17 +522,12 @@ def dawid_skene_intervals(
     fit = _result(votes, fits, start="majority")
     drawn = _draw(votes, fits, -(-n_resamples // _N_CHAINS), generator)
     n_draws, n_switched = len(drawn[0]), _count_switches(fit.confusion, drawn[1])
-    notes, blank = fit.notes, 0.0
+    blank, notes = 0.0, fit.notes
     if fit.reason is not None:
         undefined("an interval of the Dawid-Skene model", fit.reason)
         blank = math.nan
-    elif n_switched > _MANY_SWITCHED * n_draws:
-        notes = (
-            f"classes exchanged places in {n_switched} of {n_draws} draws: raters "
-            "hardly tell them apart",
-            *notes,
-        )
-        warn_caller(notes[0], SmallSampleWarning)
+    else:
+        notes += _cautions(fit, n_switched, n_draws)
     shares, confusion = (
         _ends(estimate + blank, of, level)
         for estimate, of in zip((fit.shares, fit.confusion), drawn, strict=True)
@@ -549,6 +546,25 @@ def dawid_skene_intervals(
         notes=notes,
         reason=fit.reason,
     )
+
+
+def _cautions(fit: DawidSkene, n_switched: int, n_draws: int) -> tuple[str, ...]:
+    """Warn where raters tell classes apart so little that intervals may be short."""
+    cautions = []
+    certainty = float(fit.posterior.max(axis=1).mean())
+    if certainty < _CERTAIN:
+        cautions.append(
+            f"the class of an item has a probability of {certainty:.2f} on average: "
+            f"below {_CERTAIN} the interval may cover less than it says"
+        )
+    if n_switched > _MANY_SWITCHED * n_draws:
+        cautions.append(
+            f"classes exchanged places in {n_switched} of {n_draws} draws: raters "
+            "hardly tell them apart"
+        )
+    for caution in cautions:
+        warn_caller(caution, SmallSampleWarning)
+    return tuple(cautions)
 
 
 def _draw(

@@ -1,5 +1,6 @@
 """Tests of Dawid and Skene's model and of the effective number of judges."""
 
+import csv
 import itertools
 import json
 import math
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from docs.make import judge_truth
 from masrel.errors import SmallSampleWarning, UndefinedStatisticWarning
 from masrel.judges import dawid_skene, dawid_skene_intervals, effective_number
 
@@ -255,3 +257,22 @@ def test_a_judge_without_error_is_in_no_pair_and_that_is_said() -> None:
         alone = effective_number({"a": errors["a"], "c": errors["c"]})
     assert math.isnan(alone.value)
     assert alone.reason is not None
+
+
+# -- what the pages show ---------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_row_of_the_study_of_coverage_repeats() -> None:
+    """If it does not: ``python -m docs.make.judge_truth``."""
+    with judge_truth.TABLE.open(encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    assert tuple(head) == judge_truth.HEAD
+    assert judge_truth.row(2) == rows[2]
+
+
+def test_the_section_of_the_page_is_made_from_the_rows() -> None:
+    with judge_truth.TABLE.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))[1:]
+    assert len(rows) == len(judge_truth.CELLS)
+    assert judge_truth.section(rows) in judge_truth.PAGE.read_text("utf-8")
