@@ -461,9 +461,14 @@ class Line:
     phase: NDArray[np.int8] = field(compare=False, repr=False)
 
 
+def regular_times(end: float, rate_hz: float) -> Floats:
+    """Return the times of samples until an end, s."""
+    return np.asarray(np.arange(math.floor(end * rate_hz) + 1) / rate_hz)
+
+
 def sampled(model: ToneModel, motion: Motion, rate_hz: float) -> Line:
     """Return a law of tone at a fixed rate, its events at their own times."""
-    time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
+    time = regular_times(motion.duration, rate_hz)
     return Line(
         time=time,
         angle=motion.angle(time),
@@ -533,7 +538,7 @@ def trace(parameters: JointModel, motion: Motion, *, rate_hz: float = 1000.0) ->
     end = motion.duration
     if isinstance(parameters, ElbowParameters):
         end = Timeline(parameters, motion).end
-    time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
+    time = regular_times(end, rate_hz)
     angle, velocity = motion.angle(time), motion.velocity(time)
     torque, phase = _stepped(parameters, motion.start, time, angle, velocity)
     columns = (time, angle, velocity, torque, phase)

@@ -111,10 +111,9 @@ def _grid(material: Material, session: str) -> _Grid:
     cells: dict[tuple[str, str], list[str]] = defaultdict(list)
     for row in sorted(ratings, key=attrgetter("repeat")):
         cells[row.model, row.rater] += [] if row.grade is None else [row.grade]
-    models = [m for m in material.protocol.models if m.id in {r.model for r in ratings}]
-    raters = [
-        r.id for r in material.protocol.raters if r.id in {r.rater for r in ratings}
-    ]
+    rated, rating = ({getattr(r, of) for r in ratings} for of in ("model", "rater"))
+    models = [m for m in material.protocol.models if m.id in rated]
+    raters = [r.id for r in material.protocol.raters if r.id in rating]
     shape = len(models), len(raters), max(1, *map(len, cells.values()))
     codes, words = np.full(shape, -1), []
     rows: list[tuple[Value, ...]] = []

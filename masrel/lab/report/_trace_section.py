@@ -20,10 +20,12 @@ from masrel.lab.elbow import (
     ConstantSpeed,
     ElbowParameters,
     JointModel,
+    Motion,
     evaluate,
     outline,
+    torque,
 )
-from masrel.lab.elbow._torque import Line, sampled
+from masrel.lab.elbow._torque import Line, regular_times, sampled
 from masrel.lab.protocol import Model, Protocol, joint_model
 from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
 from masrel.lab.report._material import (
@@ -56,6 +58,7 @@ _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
 _MODEL = Column(key="model", heading="Model", align="left")
 
 _Floats = NDArray[np.float64]
+_TorqueOf = Callable[[Motion, _Floats], _Floats]  # at times of a motion, N·m
 
 
 def speeds_section(material: Material) -> Iterator[Content]:
@@ -215,13 +218,19 @@ def _traced(
 
     known = [speed.mean_speed_deg_s for speed in speeds]
     line_of: Callable[[ConstantSpeed], Line]
+    torque_of: _TorqueOf
     if isinstance(joint, ElbowParameters):
         line_of = partial(outline, joint, n_points=_N_POINTS)
+        torque_of = partial(torque, joint)
         outputs = evaluate(joint, [*map(stretch, known)], ["peak_torque"])
         peaks = outputs.column("peak_torque").tolist()
     else:
-        line_of = partial(sampled, joint, rate_hz=protocol.device.rate_hz)
-        largest = {v: float(line_of(stretch(v)).torque.max()) for v in {*known}}
+        rate_hz = protocol.device.rate_hz
+        line_of, torque_of = partial(sampled, joint, rate_hz=rate_hz), joint.torque
+        largest: dict[float, float] = {}  # of equal stretches once
+        for deg_s, motion in {deg_s: stretch(deg_s) for deg_s in known}.items():
+            torques = torque_of(motion, regular_times(motion.duration, rate_hz))
+            largest[deg_s] = float(torques.max())
         peaks = [largest[deg_s] for deg_s in known]
     shown, band = list(range(len(known))), None
     if len(known) > MANY_STRETCHES:
@@ -229,7 +238,7 @@ def _traced(
         shown = [ranks[name] for name in ("lowest", "median", "highest")]
         steps = (np.arange(_N_IN_BAND) + 0.5) / _N_IN_BAND
         quantiles = np.quantile(known, steps).tolist()
-        band = _band([line_of(stretch(deg_s)) for deg_s in quantiles])
+        band = _band([*map(stretch, quantiles)], torque_of)
     digits = _whole_or_tenths(known)
     grade = ""
     if model.intended_grade is not None:
@@ -247,24 +256,21 @@ def _traced(
     )
 
 
-def _band(lines: Sequence[Line]) -> dict[str, _Floats]:
-    # lines at evenly spaced quantiles of the speeds: as many are below each time's
+def _band(motions: Sequence[Motion], torque_of: _TorqueOf) -> dict[str, _Floats]:
+    # stretches at evenly spaced quantiles of the speeds: as many are below each time's
     # quantile as of all stretches; the slower half goes on to the end of the band
-    ends = np.array([line.time[-1] for line in lines])
+    ends = np.array([motion.duration for motion in motions])
     time = np.linspace(0.0, float(np.median(ends)), _N_POINTS)
-    under_way = time <= ends[:, np.newaxis]  # (n_lines, n_points)
+    under_way = time <= ends[:, np.newaxis]  # (n_motions, n_points)
     n_under_way = under_way.sum(axis=0)
+    at = [(motion, np.minimum(time, motion.duration)) for motion in motions]
     band = {"time": time}
     columns = {
-        "angle": [np.degrees(line.angle) for line in lines],
-        "torque": [line.torque for line in lines],
+        "angle": [np.degrees(motion.angle(times)) for motion, times in at],
+        "torque": [torque_of(motion, times) for motion, times in at],
     }
     for name, column in columns.items():
-        known = [
-            np.interp(time, line.time, values)
-            for line, values in zip(lines, column, strict=True)
-        ]
-        ordered = np.sort(np.where(under_way, np.stack(known), np.inf), axis=0)
+        ordered = np.sort(np.where(under_way, np.stack(column), np.inf), axis=0)
         band[name] = np.empty((len(_BAND_SHARES), time.size))
         for n in np.unique(n_under_way):
             of_n = n_under_way == n
