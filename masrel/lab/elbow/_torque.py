@@ -106,10 +106,11 @@ def torque(parameters: ElbowParameters, motion: Motion, times: ArrayLike) -> Flo
     values = np.empty(at.shape)
     laid = segments(line)
     which = np.searchsorted([segment.start for segment in laid], at, side="right") - 1
+    moved = _moved(motion, at)
     for i, segment in enumerate(laid):
         mine = which == i
         if mine.any():
-            values[mine] = segment_torque(segment, motion, at[mine])
+            values[mine] = _segment_torque(segment, moved[:, mine])
     return values
 
 
@@ -377,12 +378,19 @@ def segments(line: Timeline) -> list[TorqueSegment]:
     return [segment for segment in laid if some(segment.end > segment.start)]
 
 
-def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats:
-    """Return the torque of one law at times, also where the next begins, N·m."""
-    law = segment.law
-    values = law.commanded(motion.angle(at, motion.origin), motion.velocity(at))
+def _moved(motion: Motion, at: Floats) -> Floats:
+    # (4, n): times, s, and how the arm is moved then: angle from the motion's origin,
+    # rad, velocity and acceleration
+    angle = motion.angle(at, motion.origin)
+    return np.stack([at, angle, motion.velocity(at), motion.acceleration(at)])
+
+
+def _segment_torque(segment: TorqueSegment, moved: Floats) -> Floats:
+    # the torque of one law at such times, also where the next begins, N·m
+    law, (at, angle, velocity, acceleration) = segment.law, moved
+    values = law.commanded(angle, velocity)
     if law.inertia:
-        values = values + law.inertia * motion.acceleration(at)
+        values = values + law.inertia * acceleration
     if law.onset is not None:
         rise, time = law.onset
         share = np.clip((at - segment.start) / time, 0.0, 1.0)
@@ -629,20 +637,19 @@ def outline(
     line = Timeline(parameters, motion)
     marks = phase_marks(line)
     begun = [time for _, time, _ in marks]
-    times, torques, codes = [], [], []
-    for segment in segments(line):
-        low, high = segment.start, segment.end
+    times, codes, laid = [], [], segments(line)
+    for low, high, _ in laid:
         n = max(2, math.ceil(n_points * (high - low) / line.end) + 1)
-        at = np.linspace(low, high, n)
-        times.append(at)
-        torques.append(segment_torque(segment, motion, at))
+        times.append(np.linspace(low, high, n))
         code = marks[bisect_right(begun, low) - 1][0]
         codes.append(np.full(n, code, dtype=np.int8))
     time = np.concatenate(times)
+    ends = np.cumsum([at.size for at in times])[:-1]
+    parts = np.split(_moved(motion, time), ends, axis=1)
     return Outline(
         time=time,
         angle=motion.angle(time),
-        torque=np.concatenate(torques),
+        torque=np.concatenate([*map(_segment_torque, laid, parts)]),
         phase=np.concatenate(codes),
         events=events(parameters, motion),
     )
