@@ -58,11 +58,11 @@ def cells(
     colours = drawn.to_rgba(values)
     for (row, column), text in np.ndenumerate(letters):
         x = left + (column + 0.5) * step
-        is_inside = row < n and column < m
-        colour = letters_on(colours[row, column]) if is_inside else GREY
-        if text:  # for which no layout need make room within the axes
+        is_inside = row < n and column < m  # where no layout need make room
+        if text:
             axes.text(
-                x, row, text, ha="center", va="center", fontsize=8, color=colour,
+                x, row, text, ha="center", va="center", fontsize=8,
+                color=letters_on(colours[row, column]) if is_inside else GREY,
                 in_layout=not is_inside,
             )  # fmt: skip
     for row, column in np.argwhere(np.zeros((n, m)) if framed is None else framed):

@@ -244,41 +244,46 @@ def finished(
 
 
 _MARK = "\N{START OF TEXT}"  # no text of a figure can have it
+# a file has curves for its letters, a page those of its reader
+_FONT_TYPES: dict[Form, str] = {"svg": "path", "inline": "none"}
 
 
 class _Vectors(RendererSVG):
-    """Draws texts as curves, then as letters; a mark is before, between and after."""
+    """Draws texts once a form, with a mark before each and after the last."""
 
     writer: Any
-    forms: Sequence[Form]  # a form that is not among them has no texts
+    forms: Sequence[Form]
 
     def draw_text(self, *args: Any, **options: Any) -> None:
-        for form, kind in (("svg", "path"), ("inline", "none")):
+        for form in self.forms:
             self.writer.comment(_MARK)
-            if form in self.forms:
-                mpl.rcParams["svg.fonttype"] = kind
-                super().draw_text(*args, **options)  # type: ignore[no-untyped-call]
+            mpl.rcParams["svg.fonttype"] = _FONT_TYPES[form]
+            super().draw_text(*args, **options)  # type: ignore[no-untyped-call]
         self.writer.comment(_MARK)
 
 
 def _vectors(figure: Figure, forms: Sequence[Form]) -> dict[Form, bytes]:
-    # A file, whose letters are curves, and a part of a page, in letters of the reader:
-    # by one drawing, as nothing takes longer.
+    # by one drawing, as nothing takes longer
     file, (width, height) = io.StringIO(), figure.get_size_inches()
-    how: dict[str, Any] = {"image_dpi": _DPI, "metadata": {"Date": None}}
-    vectors: Any = _Vectors(_POINTS * width, _POINTS * height, file, **how)  # type: ignore[no-untyped-call]
+    vectors: Any = _Vectors(  # type: ignore[no-untyped-call]
+        *(_POINTS * width, _POINTS * height, file),
+        image_dpi=_DPI,
+        metadata={"Date": None},
+    )
     vectors.forms = forms
-    # what is rasterized goes through pixels
-    mixed: Any = MixedModeRenderer(figure, width, height, _DPI, vectors)  # type: ignore[no-untyped-call]
-    figure.draw(mixed)
+    mixed: Any = MixedModeRenderer  # by which some artists go through pixels
+    figure.draw(mixed(figure, width, height, _DPI, vectors))
     vectors.finalize()
     parts = file.getvalue().split(f"<!-- {_MARK} -->\n")
-    curves, letters = (
-        "".join(part.rstrip(" ") for i, part in enumerate(parts) if i % 3 != other)
-        for other in (2, 1)
-    )
-    made: dict[Form, str] = {"svg": curves, "inline": _inlined(letters)}
-    return {form: made[form].encode() for form in forms}
+    n = len(forms) + 1  # those of each text, and what is before it
+    svgs = {
+        form: "".join(p.rstrip(" ") for i, p in enumerate(parts) if i % n in (0, place))
+        for place, form in enumerate(forms, start=1)
+    }
+    return {
+        form: (_inlined(svg) if form == "inline" else svg).encode()
+        for form, svg in svgs.items()
+    }
 
 
 def _inlined(svg: str) -> str:

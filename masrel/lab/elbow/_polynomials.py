@@ -7,7 +7,6 @@ Two places of an interval nearer than `TIE` of its length are one place, and Ber
 coefficients within `NOTHING` of the largest count as 0: floats tell no more.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import comb, inf, isfinite, nan
@@ -52,11 +51,6 @@ def least(a: Number, b: Number) -> Number:
 def greatest(a: Number, b: Number) -> Number:
     """Return the larger number; b if either is nan."""
     return pick(a > b, a, b)
-
-
-def functions_of(number: Number) -> Any:
-    """Return the module of functions such as exp: of a float, or of a column."""
-    return np if isinstance(number, np.ndarray) else math
 
 
 def chosen(columns: Sequence[Number], which: Any) -> list[Number]:

@@ -41,7 +41,7 @@ from masrel.lab.elbow.parameters import (
     onset_share,
     post_catch_law,
 )
-from masrel.lab.elbow.tone import JointModel, ToneModel
+from masrel.lab.elbow.tone import JointModel
 
 __all__ = [
     "Outline",
@@ -469,22 +469,6 @@ class Line:
     phase: NDArray[np.int8] = field(compare=False, repr=False)
 
 
-def regular_times(end: float, rate_hz: float) -> Floats:
-    """Return the times of samples until an end, s."""
-    return np.asarray(np.arange(math.floor(end * rate_hz) + 1) / rate_hz)
-
-
-def sampled(model: ToneModel, motion: Motion, rate_hz: float) -> Line:
-    """Return a law of tone at a fixed rate, its events at their own times."""
-    time = regular_times(motion.duration, rate_hz)
-    return Line(
-        time=time,
-        angle=motion.angle(time),
-        torque=model.torque(motion, time),
-        phase=model._phase(motion, time),
-    )
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trace(Line):
     """Columns of a motion at a fixed rate; arrays are read-only.
@@ -546,7 +530,7 @@ def trace(parameters: JointModel, motion: Motion, *, rate_hz: float = 1000.0) ->
     end = motion.duration
     if isinstance(parameters, ElbowParameters):
         end = Timeline(parameters, motion).end
-    time = regular_times(end, rate_hz)
+    time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
     angle, velocity = motion.angle(time), motion.velocity(time)
     torque, phase = _stepped(parameters, motion.start, time, angle, velocity)
     columns = (time, angle, velocity, torque, phase)
@@ -637,19 +621,39 @@ def outline(
     line = Timeline(parameters, motion)
     marks = phase_marks(line)
     begun = [time for _, time, _ in marks]
-    times, codes, laid = [], [], segments(line)
-    for low, high, _ in laid:
+    times, torques, codes = [], [], []
+    for segment in segments(line):
+        low, high = segment.start, segment.end
         n = max(2, math.ceil(n_points * (high - low) / line.end) + 1)
-        times.append(np.linspace(low, high, n))
+        at = np.linspace(low, high, n)
+        times.append(at)
+        torques.append(_segment_torque(segment, _moved(motion, at)))
         code = marks[bisect_right(begun, low) - 1][0]
         codes.append(np.full(n, code, dtype=np.int8))
     time = np.concatenate(times)
-    ends = np.cumsum([at.size for at in times])[:-1]
-    parts = np.split(_moved(motion, time), ends, axis=1)
     return Outline(
         time=time,
         angle=motion.angle(time),
-        torque=np.concatenate([*map(_segment_torque, laid, parts)]),
+        torque=np.concatenate(torques),
         phase=np.concatenate(codes),
         events=events(parameters, motion),
+    )
+
+
+def line(
+    joint: JointModel, motion: Motion, *, n_points: int = 800, rate_hz: float = 1000.0
+) -> Line:
+    """Return the exact law: of an elbow so many points, of others at a rate."""
+    if isinstance(joint, ElbowParameters):
+        return outline(joint, motion, n_points=n_points)
+    time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
+    phase = np.zeros(time.size, dtype=np.int8)
+    for event in joint.events(motion):
+        if event.name in joint._phases:
+            phase[time >= event.time] = joint._phases[event.name]
+    return Line(
+        time=time,
+        angle=motion.angle(time),
+        torque=joint.torque(motion, time),
+        phase=phase,
     )

@@ -14,7 +14,6 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel._input import check_option
 from masrel.errors import ParameterError
@@ -334,14 +333,6 @@ class ToneModel(Law):
         angle, velocity = motion.angle(moments), motion.velocity(moments)
         rest, memory = self.rest_from(motion.start), self._memory(motion, moments)
         return np.asarray(self._law(angle, velocity, rest, *memory))
-
-    def _phase(self, motion: Motion, times: Floats) -> NDArray[np.int8]:
-        """Return positions in `masrel.lab.recording.PHASES` at times of a motion."""
-        codes = np.zeros(times.shape, dtype=np.int8)
-        for event in self.events(motion):
-            if event.name in self._phases:
-                codes[times >= event.time] = self._phases[event.name]
-        return codes
 
     @abstractmethod
     def _law(

@@ -468,7 +468,7 @@ class Recorded(_Laid):
     (3.0, 1.0)
     """
 
-    __slots__ = ("_angles", "_knots", "interpolation")
+    __slots__ = ("interpolation",)
 
     def __init__(
         self,
@@ -481,7 +481,6 @@ class Recorded(_Laid):
         times, angles = _checked(time, angle)
         self.interpolation = interpolation
         knots, low = times - times[0], angles - angles[0]
-        self._knots, self._angles = knots, angles
         self.start, self.end = float(angles[0]), float(angles[-1])
         self.origin, self.duration = self.start, float(knots[-1])
         width = np.diff(knots)

@@ -23,7 +23,6 @@ from masrel.lab.elbow._events import events
 from masrel.lab.elbow._polynomials import (
     Number,
     Polynomial,
-    functions_of,
     greatest,
     least,
     pick,
@@ -83,8 +82,23 @@ _SHORTENED_DEG = {"1": 10.0, "2": 20.0, "3": 30.0, "4": 40.0}
 _BEYOND = math.radians(10.0)
 
 
-def _clip(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)
+def _functions(number: Number) -> Any:
+    # the module of functions such as exp, of a float or of a column
+    return np if isinstance(number, np.ndarray) else math
+
+
+def _farthest(joint: ToneModel, start_angle: float, rest: float) -> float:
+    # from a rest angle, from there to the end of the range, rad
+    return max(abs(start_angle - rest), abs(joint.range_end - rest))
+
+
+def _since(latches: list[tuple[float, float]], times: Floats) -> Floats:
+    # how long a latch is closed at times, s; -inf where none is
+    since = np.full(times.size, -math.inf)
+    for closed, opened in latches:
+        mine = (times >= closed) & (times < opened)
+        since[mine] = times[mine] - closed
+    return since
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,7 +165,7 @@ class LeadPipe(ToneModel):
 
     def largest_torque(self, *, start_angle: float, speed: float) -> float:
         """Return the largest torque of a stretch and the way back, N·m."""
-        off = max(abs(start_angle - self.rest_angle), self.range_end - self.rest_angle)
+        off = _farthest(self, start_angle, self.rest_angle)
         return self.stiffness * off + self.damping * speed + self.coulomb_torque
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
@@ -171,8 +185,8 @@ class LeadPipe(ToneModel):
         if joint.is_given_up:  # a release straightens the bristle
             kept.bristle, joint.is_given_up = 0.0, False
         if not math.isnan(kept.angle):  # the first sample finds it straight
-            moved = kept.bristle + angle - kept.angle
-            kept.bristle = _clip(moved, self.bristle_travel)
+            moved, limit = kept.bristle + angle - kept.angle, self.bristle_travel
+            kept.bristle = min(max(moved, -limit), limit)
         kept.angle = angle
         return (kept.bristle,)
 
@@ -195,11 +209,11 @@ class LeadPipe(ToneModel):
 
     def _bends(self, motion: Motion) -> Iterator[tuple[OneWay, float]]:
         # parts that go one way, and how far the bristle is bent where they start, rad
-        bent = 0.0
+        bent, limit = 0.0, self.bristle_travel
         for part in one_way(motion):
             yield part, bent
             moved = bent + part.angle_at(part.end) - part.angle[0]
-            bent = _clip(moved, self.bristle_travel)
+            bent = min(max(moved, -limit), limit)
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
         bent, limit = np.zeros(times.size), self.bristle_travel
@@ -281,7 +295,7 @@ class Cogwheel(LeadPipe):
         # how far a gap is open, 0 to 1, so long after the onset of the movement, s
         period = 1.0 / self.gap_rate
         # a gap that begins now but for rounding has begun
-        left = period - functions_of(since).fmod(since + 1e-12, period)
+        left = period - _functions(since).fmod(since + 1e-12, period)
         inside = self.gap_share * period - left
         is_open = _edge(inside, self.gap_edge) * _edge(left, self.gap_edge)
         return pick(inside < 0.0, 0.0, is_open)
@@ -340,7 +354,7 @@ class Cogwheel(LeadPipe):
 def _edge(since: Number, length: float) -> Number:
     # a raised cosine from 0 to 1 over `length`
     share = least(since / length, 1.0) if length else 1.0
-    return 0.5 - 0.5 * functions_of(share).cos(math.pi * share)
+    return 0.5 - 0.5 * _functions(share).cos(math.pi * share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -422,8 +436,7 @@ class ClaspKnife(ToneModel):
 
     def largest_torque(self, *, start_angle: float, speed: float) -> float:
         """Return the largest torque of a stretch and the way back, N·m."""
-        rest = self.rest_from(start_angle)
-        off = max(abs(start_angle - rest), abs(self.range_end - rest))
+        off = _farthest(self, start_angle, self.rest_from(start_angle))
         return self.passive_stiffness * off + float(self._reflex(self.range_end, speed))
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
@@ -438,7 +451,7 @@ class ClaspKnife(ToneModel):
     def _scale(self, since: Number) -> Number:
         # g, so long after the latch closed, s
         released = greatest(since - self.release_delay, 0.0)
-        left = functions_of(released).exp(-released / self.release_time)
+        left = _functions(released).exp(-released / self.release_time)
         return self.residual_share + (1.0 - self.residual_share) * left
 
     def _law(
@@ -492,11 +505,7 @@ class ClaspKnife(ToneModel):
                 yield "release", closed + self.release_delay
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
-        scale = np.ones(times.size)
-        for closed, opened in self._latched(motion):
-            mine = (times >= closed) & (times < opened)
-            scale[mine] = self._scale(times[mine] - closed)
-        return [scale]
+        return [self._scale(_since(self._latched(motion), times))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -594,9 +603,9 @@ class Contracture(ToneModel):
     def _law(self, angle: Number, velocity: Number, rest: float, *_: Number) -> Number:
         cap = self.cap_angle
         within = least(angle, cap) - self.end_angle
-        end = self.end_torque * functions_of(within).exp(self.end_steepness * within)
-        end = end + self.end_stiffness * greatest(angle - cap, 0.0)
-        return self.stiffness * (angle - rest) + self.damping * velocity + end
+        end = self.end_torque * _functions(within).exp(self.end_steepness * within)
+        beyond = self.end_stiffness * greatest(angle - cap, 0.0)
+        return self.stiffness * (angle - rest) + self.damping * velocity + end + beyond
 
     def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
         # when it goes beyond θ_e and θ_cap
@@ -663,8 +672,7 @@ class Dystonia(ToneModel):
 
     def largest_torque(self, *, start_angle: float, speed: float) -> float:
         """Return the largest torque of a stretch and the way back, N·m."""
-        ends = (start_angle, self.range_end)
-        off = max(abs(end - self.posture_angle) for end in ends)
+        off = _farthest(self, start_angle, self.posture_angle)
         return self.stiffness * off + self.damping * speed
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
@@ -674,7 +682,7 @@ class Dystonia(ToneModel):
     def _activation(self, since: Number) -> Number:
         # a, so long after the first sample, s: both halves of the solution
         rest, begun = self.resting_activation, greatest(since - self.episode_start, 0.0)
-        risen, exp = least(begun, self.episode_duration), functions_of(since).exp
+        risen, exp = least(begun, self.episode_duration), _functions(since).exp
         highest = 1.0 - (1.0 - rest) * exp(-risen / self.rise_time)
         more = (highest - rest) * exp((risen - begun) / self.fall_time)
         return rest + pick(begun > 0.0, more, 0.0)
@@ -792,7 +800,7 @@ class Clonus(ToneModel):
         self, _angle: Number, _velocity: Number, _rest: float, *memory: Number
     ) -> Number:
         since = greatest(memory[0], 0.0)  # the first beat began, s
-        functions = functions_of(since)
+        functions = _functions(since)
         x = functions.fmod(since * self.beat_rate, 1.0) / (self.beat_share or math.inf)
         left = functions.exp(-since / self.fade_time) if self.fade_time else 1.0
         beat = self.beat_torque * left * functions.sin(math.pi * x) ** 2
@@ -838,11 +846,7 @@ class Clonus(ToneModel):
                 yield "beat", first + n / self.beat_rate
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
-        since = np.full(times.size, -math.inf)
-        for begun, until in self._trains(motion):
-            mine = (times >= begun) & (times < until)
-            since[mine] = times[mine] - begun - self.delay
-        return [since]
+        return [_since(self._trains(motion), times) - self.delay]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -946,8 +950,7 @@ class ThresholdReflex(ToneModel):
 
     def largest_torque(self, *, start_angle: float, speed: float) -> float:
         """Return the largest torque of a stretch and the way back, N·m."""
-        rest = self.rest_from(start_angle)
-        off = max(abs(start_angle - rest), abs(self.range_end - rest))
+        off = _farthest(self, start_angle, self.rest_from(start_angle))
         passive = self.passive_stiffness * off + self.passive_damping * speed
         return passive + float(self._reflex(self.range_end, speed))
 
@@ -999,8 +1002,8 @@ class ThresholdReflex(ToneModel):
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
         late = np.maximum(times - self.delay, 0.0)
-        moved = times >= self.delay  # before that the arm rests where it starts
-        velocity = np.where(moved, motion.velocity(late), 0.0)
+        # before that the arm rests where it starts
+        velocity = np.where(times >= self.delay, motion.velocity(late), 0.0)
         return [self._reflex(motion.angle(late), velocity)]
 
 

@@ -111,9 +111,9 @@ def _grid(material: Material, session: str) -> _Grid:
     cells: dict[tuple[str, str], list[str]] = defaultdict(list)
     for row in sorted(ratings, key=attrgetter("repeat")):
         cells[row.model, row.rater] += [] if row.grade is None else [row.grade]
-    rated, rating = ({getattr(r, of) for r in ratings} for of in ("model", "rater"))
-    models = [m for m in material.protocol.models if m.id in rated]
-    raters = [r.id for r in material.protocol.raters if r.id in rating]
+    rated, rating = ({key[i] for key in cells} for i in range(2))
+    models = [model for model in material.protocol.models if model.id in rated]
+    raters = [rater.id for rater in material.protocol.raters if rater.id in rating]
     shape = len(models), len(raters), max(1, *map(len, cells.values()))
     codes, words = np.full(shape, -1), []
     rows: list[tuple[Value, ...]] = []

@@ -5,7 +5,7 @@ Measured torque stands beside the torque that was sent where recordings have it.
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -22,10 +22,9 @@ from masrel.lab.elbow import (
     JointModel,
     Motion,
     evaluate,
-    outline,
     torque,
 )
-from masrel.lab.elbow._torque import Line, regular_times, sampled
+from masrel.lab.elbow._torque import Line, line
 from masrel.lab.protocol import Model, Protocol, joint_model
 from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
 from masrel.lab.report._material import (
@@ -58,7 +57,6 @@ _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
 _MODEL = Column(key="model", heading="Model", align="left")
 
 _Floats = NDArray[np.float64]
-_TorqueOf = Callable[[Motion, _Floats], _Floats]  # at times of a motion, N·m
 
 
 def speeds_section(material: Material) -> Iterator[Content]:
@@ -217,20 +215,13 @@ def _traced(
         return ConstantSpeed(start=start, end=end, speed=math.radians(deg_s))
 
     known = [speed.mean_speed_deg_s for speed in speeds]
-    line_of: Callable[[ConstantSpeed], Line]
-    torque_of: _TorqueOf
+    line_of = partial(line, joint, n_points=_N_POINTS, rate_hz=protocol.device.rate_hz)
     if isinstance(joint, ElbowParameters):
-        line_of = partial(outline, joint, n_points=_N_POINTS)
-        torque_of = partial(torque, joint)
         outputs = evaluate(joint, [*map(stretch, known)], ["peak_torque"])
         peaks = outputs.column("peak_torque").tolist()
     else:
-        rate_hz = protocol.device.rate_hz
-        line_of, torque_of = partial(sampled, joint, rate_hz=rate_hz), joint.torque
-        largest: dict[float, float] = {}  # of equal stretches once
-        for deg_s, motion in {deg_s: stretch(deg_s) for deg_s in known}.items():
-            torques = torque_of(motion, regular_times(motion.duration, rate_hz))
-            largest[deg_s] = float(torques.max())
+        # of equal stretches once
+        largest = {v: float(line_of(stretch(v)).torque.max()) for v in {*known}}
         peaks = [largest[deg_s] for deg_s in known]
     shown, band = list(range(len(known))), None
     if len(known) > MANY_STRETCHES:
@@ -238,7 +229,7 @@ def _traced(
         shown = [ranks[name] for name in ("lowest", "median", "highest")]
         steps = (np.arange(_N_IN_BAND) + 0.5) / _N_IN_BAND
         quantiles = np.quantile(known, steps).tolist()
-        band = _band([*map(stretch, quantiles)], torque_of)
+        band = _band(joint, [*map(stretch, quantiles)])
     digits = _whole_or_tenths(known)
     grade = ""
     if model.intended_grade is not None:
@@ -256,13 +247,16 @@ def _traced(
     )
 
 
-def _band(motions: Sequence[Motion], torque_of: _TorqueOf) -> dict[str, _Floats]:
+def _band(joint: JointModel, motions: Sequence[Motion]) -> dict[str, _Floats]:
     # stretches at evenly spaced quantiles of the speeds: as many are below each time's
     # quantile as of all stretches; the slower half goes on to the end of the band
     ends = np.array([motion.duration for motion in motions])
     time = np.linspace(0.0, float(np.median(ends)), _N_POINTS)
     under_way = time <= ends[:, np.newaxis]  # (n_motions, n_points)
     n_under_way = under_way.sum(axis=0)
+    torque_of = (
+        partial(torque, joint) if isinstance(joint, ElbowParameters) else joint.torque
+    )
     at = [(motion, np.minimum(time, motion.duration)) for motion in motions]
     band = {"time": time}
     columns = {

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from masrel.lab.elbow import ElbowParameters, JointModel, Motion, Outline, Trace
+    from masrel.lab.elbow import ElbowParameters, JointModel, Motion, Outline
     from masrel.lab.elbow.tone import ToneModel
 
 _FIGURES = "masrel.lab.report._stretch_figures:"
@@ -296,8 +296,13 @@ def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
         return Drawn(_FIGURES + "catch_figure", (curves,))
     if view == "schematic":
         return Drawn(_FIGURES + "schematic_figure", _schematic(scenes[0]))
+    from masrel.lab.elbow._torque import line
+
     panels = tuple(
-        (name, [*map(_line, of)], [False] * len(of), [*map(_label, of)], None)
+        (
+            *(name, [line(scene.joint, scene.motion) for scene in of]),
+            *([False] * len(of), [*map(_label, of)], None),
+        )
         for name, of in models.items()
     )
     return Drawn(_FIGURES + "trace_figure", (panels, view))
@@ -313,14 +318,6 @@ def _elbows(scenes: Sequence[Scene]) -> list["ElbowParameters"]:
 def _label(scene: Scene) -> str:
     speed = scene.speed_deg_s
     return scene.kind if speed is None else f"{significant(speed)} deg/s"
-
-
-def _line(scene: Scene) -> "Outline | Trace":
-    from masrel.lab.elbow import ElbowParameters, outline, trace
-
-    if isinstance(scene.joint, ElbowParameters):
-        return outline(scene.joint, scene.motion)
-    return trace(scene.joint, scene.motion, rate_hz=_RATE_HZ)
 
 
 def _schematic(
