@@ -648,7 +648,7 @@ def line(
         return outline(joint, motion, n_points=n_points)
     time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz
     phase = np.zeros(time.size, dtype=np.int8)
-    for event in joint.events(motion):
+    for event in joint.events(motion) if joint._phases else ():
         if event.name in joint._phases:
             phase[time >= event.time] = joint._phases[event.name]
     return Line(

@@ -46,7 +46,7 @@ from masrel.tables._tables import SIMULATED, Column, Table, Value, as_entered, n
 
 _PANELS_PER_FIGURE, _SMALL_PANELS_PER_FIGURE = 4, 24
 _N_POINTS = 200  # of a line: a panel is not much wider
-_N_IN_BAND = 100  # lines that a band rests on
+_N_IN_BAND = 50  # lines that a band rests on
 _BAND_SHARES = (0.05, 0.25, 0.75, 0.95)
 _AROUND_S = 0.25  # shown before and after a measured stretch
 
