@@ -16,7 +16,6 @@ from masrel.errors import (
     SessionLogError,
     SessionLogInUseError,
 )
-from masrel.lab._event_log import SessionLog
 from masrel.lab.conduct import (
     Note,
     excluded_raters,
@@ -29,7 +28,7 @@ from masrel.lab.conduct import (
     record_unblinding,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.run import ScriptGrades, record_correction, run_session
+from masrel.lab.run import ScriptGrades, SessionLog, record_correction, run_session
 from masrel.lab.schedule import read_schedule
 from tests.files import edit
 

@@ -9,7 +9,6 @@ import pytest
 
 from masrel.errors import ParameterError
 from masrel.lab.conduct import allot_schedules, plan_changes, record_amendment
-from masrel.lab.conduct._plan_versions import plan_versions
 from masrel.lab.progress import rater_progress, session_progress
 from masrel.lab.protocol import (
     StudyPaths,
@@ -18,6 +17,7 @@ from masrel.lab.protocol import (
     read_protocol,
 )
 from masrel.lab.ratings import study_remarks
+from masrel.lab.run import read_log
 from masrel.lab.verification import verify_study
 from tests.files import edit
 from tests.lab.flow.conftest import run
@@ -122,7 +122,7 @@ def test_changes_are_in_the_analysis_the_checklist_and_the_export(
     assert kept == [{"key": KAPPA, **at}]
     run("checklist", root, "--guideline", "grras", "-o", f"{out}.md")
     run("export", root, "--as", "bids", "-o", str(out), "--quiet")
-    drawn = next(e for _, e in plan_versions(study))
+    drawn = next(e for e in read_log(study.conduct_file) if e.kind == "drawn")
     for text in (Path(f"{out}.md").read_text(), (out / "README.md").read_text()):
         assert text.replace("\\", "").count(f"{change}.") >= 1
     page = Path(f"{out}.md").read_text()
