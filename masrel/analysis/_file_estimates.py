@@ -345,6 +345,10 @@ _EXPLANATIONS = {
     "judge_difference": "Difference: advantage of the first less that of the second on "
     "the same items; {level} % CI and p by the jackknife; p (Holm): adjusted for all "
     "pairs.",
+    "classes": "Which share of the items of a class the rater gave each grade; right, "
+    "low and high: {level} % credible interval of that of the class itself.",
+    "worth": "How many raters who err each by themselves these are worth, by the "
+    "correlation of their errors against the reference; {level} % CI: item jackknife.",
     "labels": "Labels: {labels}. {level} % CI.",
     # comparisons
     **{

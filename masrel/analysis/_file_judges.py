@@ -5,7 +5,7 @@ of rates corrected for a judge.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from typing import Any
@@ -33,6 +33,8 @@ from masrel.judges import (
     advantage,
     advantage_differences,
     alternative_annotator_test,
+    dawid_skene_intervals,
+    effective_number,
     rate_estimates,
     reference_difference,
     score_test,
@@ -73,13 +75,14 @@ def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]
     judging = questions.judging
     if judging is None:
         raise ParameterError("judging: needed judges")
-    has_question = judging.margin is not None or judging.rate is not None
-    refuse((not has_question, _MARGIN))
-    makers: list[Callable[[_Part], _Made]] = []
-    if judging.margin is not None:
-        makers += [_beside_humans, _differences]
-    if judging.rate is not None:
-        makers.append(_rates)
+    is_asked = {
+        _beside_humans: judging.margin is not None,
+        _differences: judging.margin is not None,
+        _rates: judging.rate is not None,
+        _truth: judging.truth,
+    }
+    makers = [make for make, is_so in is_asked.items() if is_so]
+    refuse((not makers, _MARGIN))
     rows: dict[str, list[tuple[Row, Row]]] = {}
     who: dict[str, None] = {}
     for part, group, keys in _parts(file, questions, judging):
@@ -101,6 +104,7 @@ def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]
                 *_notes(name, [row for row, _ in several], questions),
             ),
             of=judging.rate or "",
+            grades=file.scale.grades if name == "truth_confusion" else (),
         )
         for at, (name, several) in enumerate(rows.items())
     ]
@@ -172,7 +176,8 @@ def _roles(
     options = ", ".join(named)
     refuse((twice, f"{options}: needed others each, got {listed(twice)} twice"))
     judges, humans, _ = named.values()
-    refuse((not judges, "--judge: needed the rater who is the judge"))
+    is_needed = not (judges or judging.truth)
+    refuse((is_needed, "--judge: needed the rater who is the judge"))
     if humans:
         return judges, humans
     several += [name for name, kind in kinds.items() if kind != "human"]
@@ -409,6 +414,84 @@ def _rates(part: _Part) -> _Made:
             )
 
 
+# ---- who is right ----
+
+
+def _truth(part: _Part) -> _Made:
+    """Give shares of classes, errors of raters, and what they are worth together."""
+    questions, grades = part.questions, part.file.scale.grades
+    raters = (*part.judges, *part.humans)
+    result = dawid_skene_intervals(
+        [
+            (item, rater, grade)
+            for rater in raters
+            for item, grade in part.texts[rater].items()
+            if grade is not None
+        ],
+        level=questions.level,
+        rng=questions.seed,
+    )
+    fit = result.fit
+    chosen = fit.posterior.argmax(axis=1)
+    texts = [text.rstrip(".") for text in dict.fromkeys((*fit.notes, *result.notes))]
+    for k, category in enumerate(fit.categories):
+        of_class = zip(
+            fit.items, fit.posterior[:, k].tolist(), chosen == k, strict=True
+        )
+        of_truth: Row = {
+            "class": category,
+            "share": float(fit.shares[k]),
+            "low": float(result.shares_low[k]),
+            "high": float(result.shares_high[k]),
+            "level": result.level,
+            "log_likelihood": fit.log_likelihood,
+            "start": fit.start,
+            "items": {str(item): p for item, p, is_chosen in of_class if is_chosen},
+            "reason": result.reason,
+        }
+        is_most = bool(k == fit.shares.argmax())
+        yield (
+            "truth",
+            of_truth,
+            {"title": category, "texts": texts, "is_default": is_most},
+        )
+    for r, rater in enumerate(fit.raters):
+        for k, category in enumerate(fit.categories):
+            shares = dict(
+                zip(fit.categories, fit.confusion[r, k].tolist(), strict=True)
+            )
+            row: Row = {
+                "rater": str(rater),
+                "class": category,
+                "right": float(fit.confusion[r, k, k]),
+                "right_low": float(result.confusion_low[r, k, k]),
+                "right_high": float(result.confusion_high[r, k, k]),
+                "shares": shares,
+            }
+            cells = {f"said_{grade}": shares.get(grade, 0.0) for grade in grades}
+            n = len(fit.items) * float(fit.shares[k])
+            yield "truth_confusion", row, {**cells, "n": n}
+    yield from _effective_number(part, raters if len(part.judges) < 2 else part.judges)
+
+
+def _effective_number(part: _Part, raters: Sequence[str]) -> _Made:
+    """Give how many raters those are worth who err together, against a reference."""
+    gold = part.texts.get(part.questions.reference or "", {})
+    if not any(gold.values()):
+        return
+    errors = {
+        rater: [
+            None if None in (of, right) else int(of != right)
+            for of, right in zip(part.texts[rater].values(), gold.values(), strict=True)
+        ]
+        for rater in raters
+    }
+    worth = effective_number(errors, level=part.questions.level)
+    keys = ("value", "low", "high", "mean_correlation", "n_judges", "n_items", "reason")
+    row = {"raters": ", ".join(raters), **{key: getattr(worth, key) for key in keys}}
+    yield "effective_number", row, {"title": "Effective number", "texts": worth.notes}
+
+
 # ---- notes and gates ----
 
 _TESTS = {
@@ -435,6 +518,10 @@ def _notes(name: str, rows: Sequence[Row], questions: Questions) -> Iterator[str
         yield note("right", **of, level=level)
     elif name == "judge_differences":
         yield note("judge_difference", level=level)
+    elif name == "truth_confusion":
+        yield note("classes", level=level)
+    elif name == "effective_number":
+        yield note("worth", level=level)
     elif name == "rates":
         yield note("labels", labels=rows[0]["labels"], level=level)
 

@@ -26,6 +26,8 @@ class Judging:
         As of `masrel.judges.alternative_annotator_test`.
     rate : str or None
         The grade whose rate is estimated.
+    truth : bool
+        Whether the class of each item is estimated without labels.
     require : tuple of str
         Gates on numbers of judges and rates.
 
@@ -43,6 +45,7 @@ class Judging:
     test: 'PairedTest | Literal["auto"]' = "auto"
     min_items: int = 30
     rate: str | None = None
+    truth: bool = False
     require: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

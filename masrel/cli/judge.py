@@ -37,7 +37,7 @@ judge = file_command(
         metavar="RATER",
         help="Rater with the right grades: the labels of --rate, and no human.",
     ),
-    estimating=("level",),
+    estimating=("level", "seed"),
     questions=[
         click.option(
             "--target",
@@ -101,6 +101,12 @@ judge = file_command(
             metavar="GRADE",
             help="Estimate how often this grade is right; labels are those of "
             "--reference, or of the one human.",
+        ),
+        click.option(
+            "--truth",
+            is_flag=True,
+            help="Estimate the class of each item and the errors of each rater without "
+            "labels (Dawid and Skene); classes are in --json.",
         ),
         click.option(
             "--require",

@@ -155,6 +155,14 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
             ("efron1981", "holm1979"),
         ),
     ),
+    "truth": (
+        _Text(
+            "Classes of items and errors of raters were estimated by Dawid and "
+            "Skene's model{}, from the majority start, with posteriors drawn by Gibbs "
+            "sampling; it takes raters to err each by themselves.",
+            ("dawid1979",),
+        ),
+    ),
     "rates": (
         _Text(
             "The rate of {row[grade]} is that of prediction-powered inference{}, from "

@@ -217,6 +217,25 @@ def judge_drawings(answers: Sequence[Answer], level: float) -> Iterator[Drawing]
             "intervals.",
         )
 
+    if rows := by_name.get("truth_confusion"):
+        grades = [row["class"] for row in by_name["truth"] or ()]
+        counts: dict[str, list[Any]] = {}
+        for row in rows:
+            expected = [row["n"] * row["shares"][grade] for grade in grades]
+            counts.setdefault(f"{row['group']} {row['rater']}".strip(), []).append(
+                expected
+            )
+        text = (
+            "How often each rater gave each grade to items of each class, as expected."
+        )
+        yield Drawing(
+            name="confusions",
+            caption=text,
+            alt=text,
+            content=Drawn(f"{_GRADES}:confusions_pictures", (counts, grades)),
+            stamp="",
+        )
+
 
 def _forest_row(row: Row, label: str, key: str, level: float) -> ForestRow:
     start = "" if key == "value" else f"{key}_"

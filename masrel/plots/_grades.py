@@ -4,7 +4,7 @@ Ordered grades are lighter to darker, others have colours that colour-blind read
 tell apart; the grade itself is written wherever there is room.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -171,6 +171,19 @@ def confusion_picture(
         counts, grades = counts[np.ix_(used, used)], [grades[k] for k in used]
         label += "\ngrades never met are left out"
     return counts_picture(counts, grades, grades, np.eye(len(grades)), names, label)
+
+
+def confusions_pictures(
+    tables: Mapping[str, Sequence[Sequence[float]]], grades: Sequence[str]
+) -> list[tuple[str, Picture]]:
+    """Return a table of classes and grades for each rater."""
+    pictures = []
+    for rater, table in tables.items():
+        counts = np.rint(np.nan_to_num(np.array(table))).astype(np.int64)
+        pictures.append(
+            ("", confusion_picture(counts, grades, ("class", rater), False))
+        )
+    return pictures
 
 
 def counts_picture(

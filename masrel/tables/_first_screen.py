@@ -219,17 +219,21 @@ _VERDICTS = {
     "judge_reference": "{judge}{group} {may}: it has the grade of {reference} on "
     "{difference} % of {items} {more} than {human}{ends}, and {margin} % fewer would "
     "do.{no_proof}",
+    "truth": "{class}{group} is the class of {share} % of {items} by the ratings alone"
+    "{ends}, if raters err each by themselves.",
     "rates": "{grade} is right for {value} % of {items}{group} by {title}{ends}; "
     "{judge} alone says {naive} %.",
 }
-_IN_PERCENT = ("advantage", "difference", "value", "naive", "low", "high", "margin")
+_IN_PERCENT = (
+    *("advantage", "difference", "value", "naive", "share", "low", "high", "margin"),
+)
 
 
 def _verdicts(answered: Sequence[Answer], items: str) -> Iterator[str]:
     """Return what is shown of every judge, and what is not, in a sentence or two."""
     for answer in answered:
         for row in answer.shown or () if answer.name in _VERDICTS else ():
-            if row.get("is_default") is False:
+            if not row.get("is_default", True):
                 continue
             passes = row.get("is_passed")
             of = {**row, "margin": row.get("epsilon")}
@@ -242,19 +246,22 @@ def _verdicts(answered: Sequence[Answer], items: str) -> Iterator[str]:
             ends = ""
             if row.get("low") is not None and row.get("reason") is None:
                 to = row.get("population", "other items").replace("items", items)
-                ends = f" ({percent(row['level'])} % confidence interval "
+                kind = "credible" if answer.name == "truth" else "confidence"
+                ends = f" ({percent(row['level'])} % {kind} interval "
                 ends += f"{of['low']} to {of['high']} %, for {to} like these)"
-            yield _VERDICTS[answer.name].format(
-                **{**of, "group": f" ({row['group']})" if row.get("group") else ""},
-                may="may stand for a human"
+            words: Row = {
+                **of,
+                "group": f" ({row['group']})" if row.get("group") else "",
+                "may": "may stand for a human"
                 if passes
                 else "is not shown to be able to stand for a human",
-                n_needed=_needed(-(-row.get("n_humans", 0) // 2), passes=passes),
-                no_proof="" if passes else " That is no proof that it is worse.",
-                more="fewer" if (row.get("difference") or 0.0) < 0.0 else "more",
-                items=items,
-                ends=ends,
-            )
+                "n_needed": _needed(-(-row.get("n_humans", 0) // 2), passes=passes),
+                "no_proof": "" if passes else " That is no proof that it is worse.",
+                "more": "fewer" if (row.get("difference") or 0.0) < 0.0 else "more",
+                "items": items,
+                "ends": ends,
+            }
+            yield _VERDICTS[answer.name].format(**words)
 
 
 def _needed(n: int, *, passes: bool | None) -> str:

@@ -12,6 +12,8 @@ import pytest
 from masrel.judges import (
     advantage,
     alternative_annotator_test,
+    dawid_skene_intervals,
+    effective_number,
     judge_plan,
     labels_needed,
     rate_estimates,
@@ -251,3 +253,37 @@ def test_items_are_planned_for_a_judge_and_for_a_rate(masrel: Caller) -> None:
         rng=0,
     )
     assert (plan["n_items"], plan["power"]) == (40, made.power)
+
+
+def test_classes_without_labels_are_those_of_the_function(
+    masrel: Caller, file: Path
+) -> None:
+    call = (file, "--judge", "large", "--judge", "small", "--truth")
+    shown = document(masrel, *call, "--reference", "Kim")
+    raters = ("large", "small", "Lee", "Ann")
+    rows = [(row["item"], name, row[name]) for name in raters for row in ROWS]
+    result = dawid_skene_intervals(rows, rng=0)
+    assert [row["share"] for row in shown["truth"]] == result.fit.shares.tolist()
+    assert [row["low"] for row in shown["truth"]] == result.shares_low.tolist()
+    classes = {item: row["class"] for row in shown["truth"] for item in row["items"]}
+    names = [str(of) for of in result.fit.categories]
+    assert classes == {
+        item: names[place]
+        for item, place in zip(
+            result.fit.items, result.fit.posterior.argmax(axis=1), strict=True
+        )
+    }
+    right = {
+        (row["rater"], row["class"]): row["right"] for row in shown["truth_confusion"]
+    }
+    assert (
+        right["small", "pass"]
+        == result.fit.confusion[
+            result.fit.raters.index("small"), names.index("pass"), names.index("pass")
+        ]
+    )
+    errors = [
+        [int(row[name] != row["Kim"]) for row in ROWS] for name in ("large", "small")
+    ]
+    (worth,) = shown["effective_number"]
+    assert worth["value"] == effective_number(errors).value
