@@ -6,6 +6,7 @@ styles and text repeat what the colours say, so that a grey print loses nothing.
 
 import hashlib
 import io
+import os
 import re
 import textwrap
 import warnings
@@ -13,9 +14,13 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
+from matplotlib import font_manager
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_mixed import MixedModeRenderer
@@ -23,6 +28,8 @@ from matplotlib.backends.backend_svg import RendererSVG
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.font_manager import get_font
+from matplotlib.text import Text
 from matplotlib.transforms import (
     Affine2DBase,
     ScaledTranslation,
@@ -30,8 +37,8 @@ from matplotlib.transforms import (
     blended_transform_factory,
 )
 
+from masrel.errors import MissingLettersWarning
 from masrel.plots._drawn_values import Form
-from masrel.plots._fonts import complete_fonts
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -65,9 +72,10 @@ SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 """Background of each phase of a stretch."""
 
 _POINTS = 72  # to the inch
+_FONT = "DejaVu Sans"  # ships with matplotlib: the same everywhere
 
 STYLE: "dict[RcKeyType, object]" = {
-    "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
+    "font.family": _FONT,
     "font.size": 9,
     "axes.labelsize": 9,
     "axes.titlesize": 9.5,
@@ -341,3 +349,44 @@ def _enlarge(figure: Figure) -> None:
     width = max([width, *across.values(), *(legend.width + 8.0 for legend in legends)])
     height = max([height, *(points + beyond for points in down.values())])
     figure.set_size_inches(width / _POINTS, height / _POINTS)
+
+
+# ---- fonts for the letters of any script, beside the one that figures are set in ----
+
+
+def complete_fonts(artist: Artist) -> None:
+    """Give all texts of a figure fonts that have their letters, where there are any."""
+    texts = [text for text in artist.findobj(Text) if isinstance(text, Text)]
+    lacking = {ord(letter) for text in texts for letter in text.get_text()} - {10}
+    families = []
+    for name, file in _fonts():
+        if not lacking:
+            break
+        if covered := lacking & _letters(file):
+            families.append(name)
+            lacking -= covered
+    if families != [_FONT]:
+        for text in texts:
+            text.set_fontfamily([_FONT, *families[1:]])
+    if lacking:
+        warnings.warn(MissingLettersWarning(map(chr, lacking)), stacklevel=4)
+
+
+def _fonts() -> Iterator[tuple[str, str]]:
+    # names and files: our own, the one that the user gives, and those of the system
+    yield _FONT, font_manager.findfont(_FONT)
+    if chosen := os.environ.get("MASREL_FONT"):
+        if Path(chosen).is_file():
+            font_manager.fontManager.addfont(chosen)
+            chosen = get_font(chosen).family_name
+        yield chosen, font_manager.findfont(chosen)
+    entries = {of.fname: of.name for of in font_manager.fontManager.ttflist}
+    # the last resort has a box for every letter
+    real = {file: name for file, name in entries.items() if "Last" not in name}
+    yield from sorted((name, file) for file, name in real.items())
+
+
+@cache
+def _letters(file: str) -> frozenset[int]:
+    font = get_font(file)
+    return frozenset(font.get_charmap()) if font.scalable else frozenset()
