@@ -287,10 +287,15 @@ def benjamini_yekutieli(p_values: Sequence[float]) -> list[float]:
     adjusted = _checked_p_values(p_values)
     known = np.flatnonzero(~np.isnan(adjusted))
     descending = known[np.argsort(-adjusted[known])]
-    ranks = np.arange(len(known), 0, -1)
-    steps = adjusted[descending] * len(known) * (1.0 / ranks).sum() / ranks
+    steps = adjusted[descending] / _yekutieli_bounds(len(known))[::-1]
     adjusted[descending] = np.minimum.accumulate(np.minimum(steps, 1.0))
     return [float(p) for p in adjusted]
+
+
+def _yekutieli_bounds(m: int) -> Floats:
+    """Return what the smallest of m p-values, the next, … are at most, over α."""
+    ranks = np.arange(1, m + 1)
+    return np.asarray(ranks / (m * (1.0 / ranks).sum()))  # theorem 1.3
 
 
 def _checked_p_values(p_values: Sequence[float]) -> Floats:

@@ -158,21 +158,26 @@ def score_test(
 
 
 def _checked_counts(b: int, c: int, n: int) -> tuple[int, int, int]:
-    for name, count in {"b": b, "c": c, "n": n}.items():
-        lowest, is_whole = int(name == "n"), isinstance(count, int | np.integer)
-        if not (is_whole and count >= lowest):
-            raise ParameterError(
-                f"{name}: needs a whole number of at least {lowest}, got {shown(count)}"
-            )
+    check_count("b", b, 0)
+    check_count("c", c, 0)
+    check_count("n", n)
     if b + c > n:
         raise ParameterError(f"n: needs at least the {b} + {c} of b and c, got {n}")
     return int(b), int(c), int(n)
 
 
-def check_share(name: str, value: float, lowest: float = 0.0) -> None:
+def check_count(name: str, count: object, fewest: int = 1) -> None:
+    """Check that an argument is a whole number that is large enough."""
+    if not isinstance(count, int | np.integer) or count < fewest:
+        raise ParameterError(
+            f"{name}: needs a whole number of at least {fewest}, got {shown(count)}"
+        )
+
+
+def check_share(name: str, value: object, lowest: float = 0.0) -> None:
     """Check that an argument is a share, or the difference of two."""
     is_number = isinstance(value, int | float | np.integer | np.floating)
-    if not (is_number and lowest <= value <= 1.0):
+    if not (is_number and lowest <= value <= 1.0):  # type: ignore[operator]
         raise ParameterError(f"{name}: needs [{lowest:g}, 1], got {shown(value)}")
 
 

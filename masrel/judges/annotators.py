@@ -25,6 +25,7 @@ from masrel.agreement import (
 )
 from masrel.agreement._engine import NO_SPREAD, Floats, Integers, check_level, undefined
 from masrel.agreement._labels import check_categories, label_codes
+from masrel.agreement.benchmarks import _yekutieli_bounds
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._question import student_t, warn_small
@@ -32,6 +33,7 @@ from masrel.judges._paired import (
     NO_CHANGE,
     PairedTest,
     ScoreTest,
+    check_count,
     check_share,
     p_less,
     p_less_of_clusters,
@@ -289,7 +291,6 @@ def alternative_annotator_test(
     n_clusters = None if units is None else int(units.max()) + 1
     warn_small(n_clusters or _FEW_CLUSTERS, _FEW_CLUSTERS, "clusters")
     winning_rate = sum(line.is_rejected for line in lines) / m
-    harmonic = sum(1.0 / k for k in range(1, m + 1))
     return AlternativeAnnotatorTest(
         winning_rate=winning_rate,
         advantage=sum(line.judge_share for line in lines) / m,
@@ -304,7 +305,7 @@ def alternative_annotator_test(
         score=graded.score,
         test=test,
         level=level,
-        thresholds=tuple(k * level / (m * harmonic) for k in range(1, m + 1)),
+        thresholds=tuple((level * _yekutieli_bounds(m)).tolist()),
         min_items=min_items,
     )
 
@@ -400,10 +401,7 @@ def _graded(
     min_items: int,
 ) -> _Graded:
     """Check grades; code those of items with two humans' and all judges' grades."""
-    if not (isinstance(min_items, int | np.integer) and min_items >= 1):
-        raise ParameterError(
-            f"min_items: needs a whole number of at least 1, got {shown(min_items)}"
-        )
+    check_count("min_items", min_items)
     title, declared, weights = _checked_score(score)
     by_human = {
         str(name): _by_item(grades, f"humans: {name}")

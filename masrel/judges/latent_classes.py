@@ -14,13 +14,14 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linear_sum_assignment
 
-from masrel._input import check_option, listed, refuse, shown, warn_caller
+from masrel._input import check_option, listed, shown, warn_caller
 from masrel.agreement import Label
 from masrel.agreement._engine import Floats, check_level, divide, undefined
 from masrel.agreement._labels import is_missing, label_codes
 from masrel.errors import RatingsError, SmallSampleWarning
 from masrel.intervals._question import recorded_generator, student_t, warn_small
 from masrel.intervals.jackknife import _variance_of
+from masrel.judges._paired import check_count
 from masrel.judges._rows import Integers, coded, columns_of
 
 _Start = Literal["majority", "highest"]
@@ -233,12 +234,7 @@ def dawid_skene(
     [1.0, 0.9, 0.5]
     """
     check_option("start", start, get_args(_Start))
-    refuse(
-        (
-            not isinstance(n_starts, int) or n_starts < 0,
-            f"n_starts: needs a whole number of at least 0, got {n_starts!r}",
-        )
-    )
+    check_count("n_starts", n_starts, 0)
     generator, seed = recorded_generator(rng)
     votes = _read(ratings)
     fits = _climb(votes, votes.votes()[:, None], _MAX_STEPS, _SETTLED)
@@ -509,13 +505,7 @@ def dawid_skene_intervals(
     True
     """
     check_level(level)
-    refuse(
-        (
-            not isinstance(n_resamples, int) or n_resamples < 20 * _N_CHAINS,
-            f"n_resamples: needs a whole number of at least {20 * _N_CHAINS}, got "
-            f"{n_resamples!r}",
-        )
-    )
+    check_count("n_resamples", n_resamples, 20 * _N_CHAINS)
     generator, seed = recorded_generator(rng)
     votes = _read(ratings)
     fits = _climb(votes, votes.votes()[:, None], _MAX_STEPS, _SETTLED)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from masrel._input import refuse, shown
+from masrel._input import refuse
 from masrel.agreement._engine import Floats, Integers, check_level
-from masrel.errors import ParameterError
+from masrel.agreement.benchmarks import _yekutieli_bounds
 from masrel.intervals._question import recorded_generator
-from masrel.judges._paired import check_share, rejected
+from masrel.judges._paired import check_count, check_share, rejected
 from masrel.judges.annotators import _EXACT_UP_TO, _Graded
 
 _LEVEL = 0.05
@@ -119,21 +119,12 @@ def judge_plan(
     (43, 0.8)
     """
     judge = human_accuracy if judge_accuracy is None else judge_accuracy
-    for name, share in {
-        "epsilon": epsilon,
-        "human_accuracy": human_accuracy,
-        "judge_accuracy": judge,
-    }.items():
-        check_share(name, share)
-    for name, count, fewest in (
-        ("n_humans", n_humans, 2),
-        ("n_categories", n_categories, 2),
-        ("n_items", _FEWEST if n_items is None else n_items, 1),
-    ):
-        if not (isinstance(count, int | np.integer) and count >= fewest):
-            raise ParameterError(
-                f"{name}: needs a whole number of at least {fewest}, got {shown(count)}"
-            )
+    check_share("epsilon", epsilon)
+    check_share("human_accuracy", human_accuracy)
+    check_share("judge_accuracy", judge)
+    check_count("n_humans", n_humans, 2)
+    check_count("n_categories", n_categories, 2)
+    check_count("n_items", _FEWEST if n_items is None else n_items)
     check_level(power, "power")
     generator, seed = recorded_generator(rng)
     seed = int(generator.integers(2**62)) if seed is None else seed
@@ -172,10 +163,10 @@ def _plan(
     m, rng = len(accuracies) - 1, np.random.default_rng([seed, n])
     b, c = _drawn(n, accuracies, n_categories, rng)
     # it passes where k ≥ m/2 p-values are at most the k-th threshold, for some k
-    harmonic = sum(1.0 / k for k in range(1, m + 1))
-    is_passed = np.zeros(len(b), dtype=bool)
-    for k in range((m + 1) // 2, m + 1):
-        bound = k * _LEVEL / (m * harmonic)
+    is_passed, bounds = np.zeros(len(b), dtype=bool), _LEVEL * _yekutieli_bounds(m)
+    for k, bound in enumerate(bounds, 1):
+        if 2 * k < m:
+            continue
         largest = rejected(n, epsilon, bound, "exact" if n <= _EXACT_UP_TO else "score")
         is_passed |= (b <= largest[c]).sum(axis=1) >= k
     share = float(is_passed.mean())

@@ -16,6 +16,7 @@ from masrel._input import check_option, listed, refuse, shown
 from masrel.agreement._engine import check_level, divide, undefined
 from masrel.agreement._labels import is_missing
 from masrel.errors import ParameterError, RatingsError
+from masrel.judges._paired import check_count, check_share
 
 if TYPE_CHECKING:
     from masrel.judges.annotators import Grades
@@ -186,14 +187,14 @@ def corrected_rate(
     (0.167, 0.056, 0.263)
     """
     check_level(level)
-    _check_shares(rate=rate)
-    _check_number("n", n)
+    check_share("rate", rate)
+    check_count("n", n)
     for name, pair in (("sensitivity", sensitivity), ("specificity", specificity)):
         if not isinstance(pair, tuple | list) or len(pair) != 2:
             needed = f"{name}: needs a share and the number of items that it is of"
             raise ParameterError(f"{needed}, got {shown(pair)}")
-        _check_shares(**{name: pair[0]})
-        _check_number(name, pair[1])
+        check_share(name, pair[0])
+        check_count(name, pair[1])
     refuse(_by_chance(sensitivity[0], specificity[0]))
     return _corrected(rate, n, sensitivity, specificity, level)
 
@@ -276,7 +277,7 @@ def prediction_powered_mean(
     check_level(level)
     check_option("method", method, get_args(_MeanMethod))
     if power is not None:
-        _check_shares(power=power)
+        check_share("power", power)
     y, f = _numbers("labels", labels), _numbers("predictions", predictions)
     pool = _numbers("unlabelled", unlabelled)
     n, m = len(y), len(pool)
@@ -461,9 +462,10 @@ def label_allocation(
     >>> round(label_allocation(200, 0.4, sensitivity=0.9, specificity=0.7, pilot=20))
     61
     """
-    _check_number("m", m)
-    _check_number("pilot", pilot)
-    _check_shares(sensitivity=sensitivity, specificity=specificity)
+    check_count("m", m)
+    check_count("pilot", pilot)
+    check_share("sensitivity", sensitivity)
+    check_share("specificity", specificity)
     check_level(rate, "rate")
     # κ of [1]: how much more the specificity varies than the sensitivity
     kappa = (pilot * (1.0 - specificity) + 1.0) / (pilot * (1.0 - sensitivity) + 1.0)
@@ -520,8 +522,10 @@ def labels_needed(
     check_level(level)
     check_level(half_width, "half_width")
     check_option("method", method, tuple(_ASSUMPTIONS)[1:])
-    _check_shares(rate=rate, sensitivity=sensitivity, specificity=specificity)
-    _check_number("n_items", n_items, 2)
+    check_share("rate", rate)
+    check_share("sensitivity", sensitivity)
+    check_share("specificity", specificity)
+    check_count("n_items", n_items, 2)
     n = np.arange(2.0, n_items + 1.0)
     passed = rate * sensitivity + (1.0 - rate) * (1.0 - specificity)
     if method == "rogan_gladen":
@@ -749,23 +753,6 @@ def _quantile(level: float, df: _Number = math.inf) -> _Number:
 
 
 # -- checks --------------------------------------------------------------------------
-
-
-def _check_shares(**shares: object) -> None:
-    """Check shares within [0, 1], each by the name of its argument."""
-    for name, share in shares.items():
-        is_number = isinstance(share, int | float | np.integer | np.floating)
-        if not (is_number and 0.0 <= share <= 1.0):  # type: ignore[operator]
-            raise ParameterError(f"{name}: needs a share in [0, 1], got {shown(share)}")
-
-
-def _check_number(name: str, number: object, at_least: int = 1) -> None:
-    """Check a whole number of items."""
-    if not isinstance(number, int | np.integer) or number < at_least:
-        raise ParameterError(
-            f"{name}: needs a whole number of items, {at_least} or more, "
-            f"got {shown(number)}"
-        )
 
 
 def _by_chance(sensitivity: float, specificity: float) -> tuple[bool, str]:
