@@ -86,7 +86,10 @@ def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]
     rows: dict[str, list[tuple[Row, Row]]] = {}
     who: dict[str, None] = {}
     for part, group, keys in _parts(file, questions, judging):
-        roles = {"judges": listed(part.judges), "humans": listed(part.humans) or "none"}
+        roles = {
+            "judges": listed(part.judges) or "none",
+            "humans": listed(part.humans) or "none",
+        }
         who[note("roles", **roles)] = None
         for make in makers:
             with placed(file.read["file"], group):
@@ -479,13 +482,19 @@ def _effective_number(part: _Part, raters: Sequence[str]) -> _Made:
     gold = part.texts.get(part.questions.reference or "", {})
     if not any(gold.values()):
         return
-    errors = {
-        rater: [
-            None if None in (of, right) else int(of != right)
-            for of, right in zip(part.texts[rater].values(), gold.values(), strict=True)
-        ]
-        for rater in raters
-    }
+    graded = zip(*(part.texts[rater].values() for rater in raters), strict=True)
+    both = zip(gold.values(), graded, strict=True)
+    # items that all have graded, and whose right grade is known
+    wrong = [
+        [of != right for of in row] for right, row in both if None not in (right, *row)
+    ]
+    refuse(
+        (
+            not wrong,
+            f"--reference: needs an item that {listed(raters)} have graded, too",
+        )
+    )
+    errors = dict(zip(raters, zip(*wrong, strict=True), strict=True))
     worth = effective_number(errors, level=part.questions.level)
     keys = ("value", "low", "high", "mean_correlation", "n_judges", "n_items", "reason")
     row = {"raters": ", ".join(raters), **{key: getattr(worth, key) for key in keys}}

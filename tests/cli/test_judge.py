@@ -287,3 +287,8 @@ def test_classes_without_labels_are_those_of_the_function(
     ]
     (worth,) = shown["effective_number"]
     assert worth["value"] == effective_number(errors).value
+    # of a reference of few items only these count
+    rows = [{**row, "Kim": row["Kim"] if i < 57 else ""} for i, row in enumerate(ROWS)]
+    written(file.parent, rows)
+    (worth,) = document(masrel, *call, "--reference", "Kim")["effective_number"]
+    assert worth["value"] == effective_number([of[:57] for of in errors]).value

@@ -324,7 +324,8 @@ TABLE: dict[str, Asked] = {
         tries={
             "--ignore gold": "11 21 22 11",
             "--raters Kim,Lee": "11 21 22 11",
-            "masrel diagnose --reference gold": None,
+            # κ of Kim and Lee: (3/4 − 34/64)/(1 − 34/64)
+            "masrel diagnose --reference gold": {"estimates 1 value": 7 / 15},
         },
     ),
     "nothing in common": Asked(
