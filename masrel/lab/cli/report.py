@@ -240,9 +240,11 @@ def report(
     else:
         cut_off = f"note: {folder}: {CUT_OFF}\n" * is_cut_off(folder)
         click.echo(cut_off, err=True, nl=False)
-        files, shown = _made(
-            study, ratings_file, only, formats, gating, include, output
-        )
+        # most of what libraries and figures make stays in use
+        with read_once(), collector_off():
+            files, shown = _made(
+                study, ratings_file, only, formats, gating, include, output
+            )
         numbers = files[NUMBERS]
         if check:
             changes = _changes(files, folder)
@@ -288,46 +290,42 @@ def _made(
     from masrel.lab.report._pages import CONVERTED, pandoc_version
     from masrel.lab.verification import anchors_of
 
-    # most of what libraries and figures make stays in use
-    with read_once(), collector_off():
-        data = read_study(study, ratings_file, allows_sealed=True)
-        protocol, ratings = data.protocol, data.ratings
-        known = section_names(protocol, is_sealed=ratings.is_sealed)
-        for name in only:
-            check_option("--only", name, known)
-        if CONVERTED & {*protocol.report.formats, *formats}:
-            pandoc_version()
-        gates = gating.gates(protocol)
-        conduct = study_conduct(
-            data.paths, protocol, file=ratings_file, include=include
+    data = read_study(study, ratings_file, allows_sealed=True)
+    protocol, ratings = data.protocol, data.ratings
+    known = section_names(protocol, is_sealed=ratings.is_sealed)
+    for name in only:
+        check_option("--only", name, known)
+    if CONVERTED & {*protocol.report.formats, *formats}:
+        pandoc_version()
+    gates = gating.gates(protocol)
+    conduct = study_conduct(data.paths, protocol, file=ratings_file, include=include)
+    with warnings_as_notes():
+        analysis = analyze(
+            protocol,
+            ratings,
+            in_person=data.in_person,
+            answers=data.answers,
+            excluded=data.excluded,
+            changes=data.changes,
         )
-        with warnings_as_notes():
-            analysis = analyze(
-                protocol,
-                ratings,
-                in_person=data.in_person,
-                answers=data.answers,
-                excluded=data.excluded,
-                changes=data.changes,
-            )
-        in_person, folder = data.in_person, data.paths.sessions
-        material = gather(protocol, ratings, analysis, in_person, folder, conduct)
-        bar = tqdm(desc="report", unit=" parts", disable=output.quiet or None)
+    in_person, folder = data.in_person, data.paths.sessions
+    material = gather(protocol, ratings, analysis, in_person, folder, conduct)
+    bar = tqdm(desc="report", unit=" parts", disable=output.quiet or None)
 
-        def progress(part: str) -> None:
-            bar.set_postfix_str(part, refresh=False)
-            bar.update()
+    def progress(part: str) -> None:
+        bar.set_postfix_str(part, refresh=False)
+        bar.update()
 
-        with warnings_as_notes(), bar:
-            files = make_report(
-                material,
-                # of what is simulated none, so that it repeats byte for byte
-                anchors=() if ratings.simulated else anchors_of(data.paths),
-                progress=progress,
-                raw_csv=output.raw_csv,
-                only=only,
-                formats=formats,
-            )
+    with warnings_as_notes(), bar:
+        files = make_report(
+            material,
+            # of what is simulated none, so that it repeats byte for byte
+            anchors=() if ratings.simulated else anchors_of(data.paths),
+            progress=progress,
+            raw_csv=output.raw_csv,
+            only=only,
+            formats=formats,
+        )
     return files, {
         # of what is written, not of what is there: others may write there, too
         "manifest": hashlib.sha256(files[MANIFEST]).hexdigest(),
