@@ -18,11 +18,11 @@ from masrel._input import check_option, listed, shown, warn_caller
 from masrel.agreement import Label
 from masrel.agreement._engine import Floats, check_level, divide, undefined
 from masrel.agreement._labels import is_missing, label_codes
+from masrel.agreement._rows import Integers, coded, columns_of
 from masrel.errors import RatingsError, SmallSampleWarning
 from masrel.intervals._question import recorded_generator, student_t, warn_small
 from masrel.intervals.jackknife import _variance_of
 from masrel.judges._paired import check_count
-from masrel.judges._rows import Integers, coded, columns_of
 
 _Start = Literal["majority", "highest"]
 """Where the answer comes from: the shares of votes, or the best of all starts."""

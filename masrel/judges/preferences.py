@@ -15,11 +15,11 @@ from scipy.special import expit
 from masrel._input import check_option, listed, shown
 from masrel.agreement import bowker, mcnemar
 from masrel.agreement._engine import Floats, check_level, divide, undefined
+from masrel.agreement._rows import Integers, coded, columns_of
 from masrel.errors import RatingsError
 from masrel.estimates import Significance
 from masrel.intervals._question import student_t, warn_small
 from masrel.judges._paired import score_test
-from masrel.judges._rows import Integers, coded, columns_of
 
 _Ties = Literal["half", "left out"]
 
