@@ -12,13 +12,13 @@ _MAX_LISTED = 40
 USUAL_NAMES = {
     "item": (
         *("item", "item_id", "model", "subject", "subject_id", "patient", "patient_id"),
-        *("case", "unit", "task", "task_id", "document", "video"),
+        *("case", "unit", "task", "task_id", "document", "video", "pair"),
     ),
     "rater": (
         *("rater", "rater_id", "annotator", "annotator_id", "coder", "coder_id"),
         *("judge", "observer", "worker", "worker_id", "assessor", "reviewer"),
     ),
-    "grade": ("grade", "rating", "score", "label"),
+    "grade": ("grade", "rating", "score", "label", "winner"),
     "session": ("session",),
 }
 """Names of columns that are recognized, letter case aside."""

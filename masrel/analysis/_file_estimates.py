@@ -350,6 +350,13 @@ _EXPLANATIONS = {
     "worth": "How many raters who err each by themselves these are worth, by the "
     "correlation of their errors against the reference; {level} % CI: item jackknife.",
     "labels": "Labels: {labels}. {level} % CI.",
+    "position": "First gains: share of pairs that go to whichever answer is shown "
+    "first, less that of those which go to the second; {level} % CI by Tango, p by "
+    "McNemar's exact test. Same: share of pairs with one verdict in both orders, a tie "
+    "being one; without: of pairs without a tie.{ties}",
+    "strengths": "Strength: logarithm of the odds against an average answer "
+    "(Bradley-Terry); a tie is half a win. {level} % CI: variance by items, Student's "
+    "t.",
     # comparisons
     **{
         f"difference_of_{units}": "Difference: the first less the second. SE, {level} "

@@ -25,6 +25,7 @@ from masrel.analysis._file_estimates import (
     parts_of,
     placed,
 )
+from masrel.analysis._file_preferences import preference_answers
 from masrel.analysis._gates import Gate, GateResult, read_gate
 from masrel.analysis._judging import Judging
 from masrel.errors import ParameterError
@@ -75,6 +76,10 @@ def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]
     judging = questions.judging
     if judging is None:
         raise ParameterError("judging: needed judges")
+    if judging.order is not None:
+        answered = list(preference_answers(file, questions))
+        yield from _with_gates(answered, judging.require)
+        return
     is_asked = {
         _beside_humans: judging.margin is not None,
         _differences: judging.margin is not None,
@@ -111,9 +116,7 @@ def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]
         )
         for at, (name, several) in enumerate(rows.items())
     ]
-    yield from answered
-    if judging.require:
-        yield _gates(answered, judging.require)
+    yield from _with_gates(answered, judging.require)
 
 
 def _parts(
@@ -540,11 +543,15 @@ _GATED = {
     "judges": ("winning_rate", "advantage", "low", "high"),
     "judge_reference": ("difference", "low", "high"),
     "rates": ("value", "low", "high"),
+    "preferences": ("value", "low", "high", "agreement"),
 }
 
 
-def _gates(answers: Sequence[Answer], require: Sequence[str]) -> Answer:
-    """Hold numbers of judges and rates against gates such as ``rate.low >= 0.8``."""
+def _with_gates(answers: Sequence[Answer], require: Sequence[str]) -> Iterator[Answer]:
+    """Give answers, and what of them is held against ``rate.low >= 0.8``."""
+    yield from answers
+    if not require:
+        return
     rows: dict[str, tuple[tuple[str, ...], Row]] = {}
     for answer in answers:
         numbers, is_rate = _GATED.get(answer.name, ()), answer.name == "rates"
@@ -560,7 +567,7 @@ def _gates(answers: Sequence[Answer], require: Sequence[str]) -> Answer:
         read_gate(text, numbers_of, where="--require", **about) for text in require
     ]
     results = [_held(gate, rows[gate.estimate][1]) for gate in gates]
-    return Answer(
+    yield Answer(
         name="gates",
         rows=[result.record() for result in results],
         shown=[

@@ -28,6 +28,8 @@ class Judging:
         The grade whose rate is estimated.
     truth : bool
         Whether the class of each item is estimated without labels.
+    order : str or None
+        The column of which answer was shown first; grades are the answers preferred.
     require : tuple of str
         Gates on numbers of judges and rates.
 
@@ -46,6 +48,7 @@ class Judging:
     min_items: int = 30
     rate: str | None = None
     truth: bool = False
+    order: str | None = None
     require: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -53,6 +56,12 @@ class Judging:
             (
                 self.epsilon is not None and self.annotators is not None,
                 "--epsilon, --annotators: needed one of them, got both",
+            ),
+            (
+                self.order is not None
+                and (self.margin is not None or self.rate is not None or self.truth),
+                "--order: is of preferences, which --epsilon, --annotators, --rate and "
+                "--truth say nothing of",
             ),
         )
 

@@ -226,7 +226,9 @@ def _show_answers(
     )
     judging = questions.judging
     if judging is not None:  # of a stream nobody knows which item is which
-        reading = replace(reading, stream=False)
+        both = judging.order is not None and reading.by is not None
+        refuse((both, "--order, --by: needed one of them, got both"))
+        reading = replace(reading, stream=False, by=judging.order or reading.by)
     ratings = read_file(file, reading)
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers

@@ -109,12 +109,18 @@ judge = file_command(
             "labels (Dawid and Skene); classes are in --json.",
         ),
         click.option(
+            "--order",
+            metavar="COL",
+            help="Column of which of two answers was shown first; grades are the one "
+            "preferred, or a tie: how far the order decides, and which is better.",
+        ),
+        click.option(
             "--require",
             multiple=True,
             metavar="GATE",
             help="Exit with 1 unless a number keeps a limit, as 'gpt-4o.winning_rate "
             ">= 0.5': winning_rate, advantage, low or high of a judge; value, low or "
-            "high of rate.",
+            "high of rate; agreement of preferences.",
         ),
     ),
     figure="Draw the judge beside each human, or rates, into this .png, .svg or .pdf.",

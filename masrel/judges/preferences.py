@@ -13,8 +13,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.special import expit
 
 from masrel._input import check_option, listed, shown
-from masrel.agreement import bowker, mcnemar
-from masrel.agreement._engine import Floats, check_level, divide, undefined
+from masrel.agreement import mcnemar
+from masrel.agreement._engine import NO_SPREAD, Floats, check_level, divide, undefined
 from masrel.agreement._rows import Integers, coded, columns_of
 from masrel.errors import RatingsError
 from masrel.estimates import Significance
@@ -50,8 +50,8 @@ class PositionBias:
     n_pairs, n_ties, n_unpaired : int
         Pairs in both orders, those of them with a tie, and pairs in one order only,
         which are left out.
-    mcnemar, bowker : Significance
-        Tests that no position gains: of all pairs together, and of each kind of change.
+    mcnemar : Significance
+        Exact test that neither position gains; `masrel.agreement.bowker` takes `table`.
     notes : tuple of str
         What the reader must know before relying on it.
     """
@@ -67,7 +67,6 @@ class PositionBias:
     n_ties: int
     n_unpaired: int
     mcnemar: Significance
-    bowker: Significance
     notes: tuple[str, ...] = ()
 
 
@@ -98,11 +97,6 @@ def position_bias(
         in both.
     ParameterError
         If the level is invalid.
-
-    Warns
-    -----
-    UndefinedStatisticWarning
-        If no verdict changes with the order: there is no test by Bowker.
 
     References
     ----------
@@ -160,7 +154,6 @@ def position_bias(
         n_ties=n_pairs - int(corners.sum()),
         n_unpaired=len(verdicts) - n_pairs,
         mcnemar=mcnemar([[stays, gains], [losses, 0]]),
-        bowker=bowker(table),
         notes=notes,
     )
 
@@ -266,7 +259,8 @@ def bradley_terry(
     Warns
     -----
     UndefinedStatisticWarning
-        If some models never lose to any of the others: they have no finite strength.
+        If some models never lose to any of the others, so that they have no finite
+        strength, or verdicts on all items are alike, so that there is no interval.
     SmallSampleWarning
         Below 10 items.
 
@@ -314,7 +308,12 @@ def bradley_terry(
     information = _information(wins, strengths)
     inverse = information if reason else np.linalg.pinv(information)  # all are nan
     covariance = inverse @ (sums.T @ sums) @ inverse * n_items / max(n_items - 1, 1)
-    half = student_t(level, n_items - 1) * np.sqrt(np.diag(covariance))
+    error = np.sqrt(np.diag(covariance))
+    notes = warn_small(n_items, 10, "items")
+    if (error < _SETTLED).any():  # items that all say the same show no error
+        notes = (undefined("the interval of a strength", NO_SPREAD), *notes)
+        error[error < _SETTLED] = math.nan
+    half = student_t(level, n_items - 1) * error
     return BradleyTerry(
         models=tuple(models),
         strengths=strengths,
@@ -327,7 +326,7 @@ def bradley_terry(
         ties=ties,
         level=level,
         method=f"variance by items, t({n_items - 1})",
-        notes=warn_small(n_items, 10, "items"),
+        notes=notes,
         reason=reason,
     )
 

@@ -155,6 +155,20 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
             ("efron1981", "holm1979"),
         ),
     ),
+    "preferences": (
+        _Text(
+            "Whether a judge gains the answer shown first was told from pairs shown in "
+            "both orders, by Tango's interval and McNemar's exact test{}.",
+            ("tango1998", "mcnemar1947"),
+        ),
+    ),
+    "strengths": (
+        _Text(
+            "Strengths are those of the model of Bradley and Terry{}, with a variance "
+            "by items.",
+            ("bradley1952",),
+        ),
+    ),
     "truth": (
         _Text(
             "Classes of items and errors of raters were estimated by Dawid and "

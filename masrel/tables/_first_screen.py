@@ -221,11 +221,24 @@ _VERDICTS = {
     "do.{no_proof}",
     "truth": "{class}{group} is the class of {share} % of {items} by the ratings alone"
     "{ends}, if raters err each by themselves.",
+    "preferences": "{judge} gives the same verdict in both orders on {agreement} % of "
+    "{n_pairs} pairs; share won by being shown first, less that by being shown second: "
+    "{value} %{ends}.",
     "rates": "{grade} is right for {value} % of {items}{group} by {title}{ends}; "
     "{judge} alone says {naive} %.",
 }
 _IN_PERCENT = (
-    *("advantage", "difference", "value", "naive", "share", "low", "high", "margin"),
+    *(
+        "advantage",
+        "agreement",
+        "difference",
+        "value",
+        "naive",
+        "share",
+        "low",
+        "high",
+        "margin",
+    ),
 )
 
 

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from itertools import combinations
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -12,10 +13,12 @@ import pytest
 from masrel.judges import (
     advantage,
     alternative_annotator_test,
+    bradley_terry,
     dawid_skene_intervals,
     effective_number,
     judge_plan,
     labels_needed,
+    position_bias,
     rate_estimates,
 )
 from tests.cli.process import Caller
@@ -210,6 +213,32 @@ def test_groups_are_judged_each_and_have_gates(masrel: Caller, tmp_path: Path) -
     table = list(csv.DictReader(io.StringIO(done.out.partition("\n\n")[0])))
     assert [row["task"] for row in table] == ["sums", "law"]
     assert table[0]["advantage"] == table[1]["advantage"]
+
+
+def test_preferences_are_those_of_the_functions(masrel: Caller, tmp_path: Path) -> None:
+    draw, names = Random(5).choice, ("a", "b", "c")
+    rows = [
+        (item, first, second, draw((first, second, second, "tie")))
+        for item, (one, two) in enumerate(combinations(names * 8, 2))
+        if one != two
+        for first, second in ((one, two), (two, one))
+    ]
+    rows.append((999, "a", "b", "b"))  # and one in one order
+    table = [
+        {"pair": item, "judge": "large", "first": first, "winner": best}
+        for item, first, _, best in rows
+    ]
+    file = written(tmp_path, table)
+    done = masrel("judge", file, "--order", "first", "--json", "-")
+    shown = json.loads(done.out)
+    bias, fit = position_bias(rows), bradley_terry(rows)
+    (row,) = shown["preferences"]
+    for key in ("value", "low", "high", "agreement", "n_pairs", "n_ties", "n_unpaired"):
+        assert row[key] == getattr(bias, key), key
+    assert row["p_value"] == bias.mcnemar.p_value
+    strengths = {row["model"]: row["value"] for row in shown["strengths"]}
+    expected = dict(zip(fit.models, fit.strengths.tolist(), strict=True))
+    assert strengths == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("form", ["--csv", "--latex", "--sentence"])

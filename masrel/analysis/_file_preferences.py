@@ -1,0 +1,95 @@
+"""Preferences in a file: whether the order of two answers decides, and which is better.
+
+In: a `RatingsFile` whose parts are the answers shown first, and whose grades are the
+answers preferred. Out: rows of judges, and of the answers that each preferred.
+"""
+
+from collections.abc import Iterator
+
+from masrel._input import listed, refuse
+from masrel.agreement import code_ratings
+from masrel.analysis._file_estimates import Answer, Questions, Row, note, placed
+from masrel.errors import RatingsError
+from masrel.judges import bradley_terry, position_bias
+from masrel.ratings import RatingsFile
+
+_Verdict = tuple[str, str, str, str]  # item, shown first, shown second, preferred
+
+
+def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    """Return how far order decides what each judge prefers, and how strongly."""
+    verdicts, tie = _verdicts(file)
+    judges = questions.judging.judges if questions.judging else ()
+    for judge in judges:
+        known = f"needed one of {listed(verdicts)}, got {judge!r}"
+        refuse((judge not in verdicts, f"--judge: {known}"))
+    biases: list[Row] = []
+    strengths: list[Row] = []
+    for judge in judges or list(verdicts):
+        with placed(file.read["file"], judge):
+            bias = position_bias(verdicts[judge], tie=tie, level=questions.level)
+            fit = bradley_terry(verdicts[judge], tie=tie, level=questions.level)
+        keys = ("value", "low", "high", "level", "agreement", "agreement_without_ties")
+        counts = ("n_pairs", "n_ties", "n_unpaired")
+        row = {"judge": judge, **{of: getattr(bias, of) for of in (*keys, *counts)}}
+        biases.append(row | {"p_value": bias.mcnemar.p_value, "notes": bias.notes})
+        ends = zip(fit.models, fit.strengths, fit.low, fit.high, strict=True)
+        for model, value, low, high in ends:
+            of_model = {"judge": judge, "model": model, "value": float(value)}
+            of_ends = {"low": float(low), "high": float(high), "reason": fit.reason}
+            strengths.append({**of_model, **of_ends, "notes": fit.notes})
+    level = questions.level
+    several = {
+        "preferences": (
+            biases,
+            note("position", level=level, ties=f" A tie is {tie!r}." if tie else ""),
+        ),
+        "strengths": (strengths, note("strengths", level=level)),
+    }
+    for name, (rows, below) in several.items():
+        shown = [_shown(row) for row in rows]
+        yield Answer(name=name, rows=rows, shown=shown, notes=(below,))
+
+
+def _shown(row: Row) -> Row:
+    reason = row.get("reason")
+    why = [] if reason is None else [f"undefined: {reason}"]
+    texts = [*why, *row.get("notes", ())]
+    return {**row, "title": row["judge"], "group": "", "texts": texts}
+
+
+def _verdicts(file: RatingsFile) -> tuple[dict[str, list[_Verdict]], str]:
+    """Return the verdicts of each rater, and the grade that is a tie."""
+    shown_first = [str(part.group) for part in file.parts]
+    other = [grade for grade in file.scale.grades if grade not in shown_first]
+    refuse(
+        (
+            len(other) > 1,
+            "--order: needs the answer shown first in it, as --grade has the one "
+            f"preferred or a tie, but none of {listed(other)} is ever shown first",
+        )
+    )
+    tie = other[0] if other else ""
+    answers: dict[str, dict[str, None]] = {}  # of every item
+    graded: list[tuple[str, str, str, str]] = []
+    for part, first in zip(file.parts, shown_first, strict=True):
+        codes = code_ratings(part.ratings).codes  # (n_items, n_raters)
+        for item, of_item in zip(part.items or (), codes.tolist(), strict=True):
+            of = answers.setdefault(item, {first: None})
+            of[first] = None
+            for rater, code in zip(part.raters, of_item, strict=True):
+                if code >= 0:
+                    grade = file.scale.grades[code]
+                    of |= {} if grade == tie else {grade: None}
+                    graded.append((rater, item, first, grade))
+    verdicts: dict[str, list[_Verdict]] = {}
+    for rater, item, first, grade in graded:
+        pair = answers[item] if len(shown_first) > 2 else dict.fromkeys(shown_first)
+        if len(pair) > 2:
+            raise RatingsError(
+                f"{file.read['file']}: item {item!r} compares {listed(pair)}: --item "
+                "needs columns that tell pairs apart, too"
+            )
+        for second in pair.keys() - {first}:  # none is known of some in one order
+            verdicts.setdefault(rater, []).append((item, first, second, grade))
+    return verdicts, tie
