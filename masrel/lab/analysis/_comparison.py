@@ -23,7 +23,12 @@ from masrel.lab._study_files import (
     parse_json,
     read_regular,
 )
-from masrel.lab.analysis._results import ANALYSIS_FORMAT, Analysis, PlannedEstimate
+from masrel.lab.analysis._results import (
+    ANALYSIS_FORMAT,
+    Analysis,
+    PlannedEstimate,
+    PlannedJudge,
+)
 
 # inputs are compared by themselves; notes say in words what numbers beside them say
 _LEFT_OUT = ("format", "inputs", "masrel_version", "notes")
@@ -52,13 +57,19 @@ def check_gates(analysis: Analysis, gates: Iterable[Gate]) -> tuple[GateResult, 
     tuple of GateResult
         One per gate. A number that is undefined or not in the data fails.
     """
-    planned = {each.line.id: each for each in analysis.estimates}
+    every: list[PlannedEstimate | PlannedJudge]
+    every = [*analysis.estimates, *analysis.judges]
+    planned = {each.line.id: each for each in every}
     return tuple(
         gate.hold(*_number(gate.number, planned[gate.estimate])) for gate in gates
     )
 
 
-def _number(name: str, planned: PlannedEstimate) -> tuple[float, str | None]:
+def _number(
+    name: str, planned: PlannedEstimate | PlannedJudge
+) -> tuple[float, str | None]:
+    if isinstance(planned, PlannedJudge):
+        return getattr(planned.result, name, math.nan), planned.reason
     # a number of an estimate, or why there is none
     estimate = planned.estimate
     if name == "n_missing" and planned.reason is None:

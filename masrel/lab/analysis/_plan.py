@@ -25,10 +25,16 @@ from masrel.lab.analysis._descriptions import (
     question_summaries,
     stretching_speeds,
 )
-from masrel.lab.analysis._results import Analysis, PlannedEstimate, RaterEstimate
+from masrel.lab.analysis._results import (
+    Analysis,
+    PlannedEstimate,
+    PlannedJudge,
+    RaterEstimate,
+)
 from masrel.lab.conduct import PlanChange
 from masrel.lab.protocol import (
     EstimatePlan,
+    JudgeKeys,
     Protocol,
     protocol_hash,
     report_sections,
@@ -124,6 +130,12 @@ def analyze(
             else _estimate(line, protocol, ratings)
             for line in protocol.analysis.estimates
         ),
+        judges=tuple(
+            PlannedJudge(line=line, reason=_SEALED_STILL)
+            if is_sealed
+            else _judge(line, ratings)
+            for line in protocol.analysis.judges
+        ),
         intended=(
             intended_agreement(protocol, ratings, session)
             if "intended" in sections
@@ -209,6 +221,26 @@ def _estimate(
             raise ProtocolError(f"analysis.estimates {line.id!r}: {error}") from error
         reason = f"not with the ratings that are there: {error}"
         return PlannedEstimate(line=line, reason=reason)
+
+
+def _judge(line: JudgeKeys, ratings: Ratings) -> PlannedJudge:
+    """Hold a rater beside the others of a session, presentation by presentation."""
+    from masrel.judges import alternative_annotator_test
+
+    grades: dict[str, dict[tuple[str, int], str | None]] = {line.judge: {}}
+    for row in ratings.rows:
+        is_asked = row.rater in (line.judge, *line.humans) or not line.humans
+        if row.session == line.session and is_asked:
+            grades.setdefault(row.rater, {})[row.model, row.repeat] = row.grade
+    judge = grades.pop(line.judge)
+    try:
+        result = alternative_annotator_test(
+            grades, judge, epsilon=line.epsilon, min_items=line.min_items
+        )
+    except (ParameterError, RatingsError) as error:
+        reason = f"not with the ratings that are there: {error}"
+        return PlannedJudge(line=line, reason=reason)
+    return PlannedJudge(line=line, result=result)
 
 
 def _planned(

@@ -16,10 +16,12 @@ import msgspec
 from masrel._files import usual_mode, write_file
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, as_document
-from masrel.lab.protocol import EstimatePlan
+from masrel.lab.protocol import EstimatePlan, JudgeKeys
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from masrel.judges import AlternativeAnnotatorTest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +74,25 @@ class PlannedEstimate:
     def models(self) -> tuple[str, ...]:
         """The models of the items: one that came again is an item each time."""
         return tuple(dict.fromkeys(item.partition("#")[0] for item in self.items))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedJudge:
+    """A judge of the plan beside the humans of a session.
+
+    Attributes
+    ----------
+    line : JudgeKeys
+        What the plan asks for.
+    result : AlternativeAnnotatorTest or None
+        Whether the judge may stand for a human; items are presentations.
+    reason : str or None
+        Why there is no result, or None.
+    """
+
+    line: JudgeKeys
+    result: "AlternativeAnnotatorTest | None" = None
+    reason: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -335,6 +356,8 @@ class Analysis:
         Nominal level of the intervals.
     estimates : tuple of PlannedEstimate
         One per line of the plan, in its order.
+    judges : tuple of PlannedJudge
+        One per judge of the plan.
     intended : IntendedAgreement or None
         None when no section asks for it.
     in_person : InPersonAgreement or None
@@ -361,6 +384,7 @@ class Analysis:
     study: str
     level: float
     estimates: tuple[PlannedEstimate, ...]
+    judges: tuple[PlannedJudge, ...] = ()
     intended: IntendedAgreement | None
     in_person: InPersonAgreement | None
     speeds: Speeds | None
@@ -378,7 +402,7 @@ ANALYSIS_FORMAT = 1
 
 
 # Fields that analyses once had not, and have not in a file where they are empty
-_LATER = ("excluded", "plan_changes", "questionnaires")
+_LATER = ("judges", "excluded", "plan_changes", "questionnaires")
 
 
 def as_analysis_document(analysis: Analysis) -> dict[str, object]:

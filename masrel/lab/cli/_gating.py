@@ -40,10 +40,9 @@ class GateOptions:
     def gates(self, protocol: "Protocol") -> "tuple[Gate, ...]":
         """Return the gates of the protocol and of the call, each checked."""
         # Imported here, as below: a report that is current is told so without them.
-        from masrel.lab.protocol import gates_of, parse_gate
+        from masrel.lab.protocol.content import _gate_of, gates_of
 
-        ids = [line.id for line in protocol.analysis.estimates]
-        of_call = (parse_gate(text, ids, where="--require") for text in self.require)
+        of_call = (_gate_of(text, protocol, where="--require") for text in self.require)
         return (*gates_of(protocol), *of_call)
 
 
@@ -57,7 +56,8 @@ def gate_options() -> Decorator:
             multiple=True,
             metavar="GATE",
             help="Exit with 1 unless a number keeps a limit, as 'kappa.low >= 0.4': "
-            "value, low, high, width, n, n_missing or p of an estimate of the plan.",
+            "value, low, high, width, n, n_missing or p of an estimate of the plan; "
+            "winning_rate or advantage of a judge of it.",
         ),
         click.option(
             "--junit",

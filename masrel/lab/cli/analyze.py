@@ -73,7 +73,7 @@ def analyze(
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
     from masrel.lab.report import study_conduct
-    from masrel.lab.report._agreement import estimate_tables
+    from masrel.lab.report._agreement import estimate_tables, judge_tables
     from masrel.lab.report._document import made_section
     from masrel.lab.report._grade_sections import felt_sentences
     from masrel.lab.report._material import gather, lacking
@@ -88,6 +88,7 @@ def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> N
     if felt:
         click.echo(textwrap.fill(felt, 88) + "\n", err=csv)
     contents: list[Content] = [table for _, table in estimate_tables(material)]
+    contents += judge_tables(material)
     for name in ("intended", "in-person", "questionnaires"):
         _, section, reason = made_section(name, material)
         if reason not in ("", lacking(None).text):

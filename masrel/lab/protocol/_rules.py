@@ -14,12 +14,13 @@ from masrel.lab._study_files import repeated
 from masrel.lab.protocol._decode import got, needed
 from masrel.lab.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
 from masrel.lab.protocol._values import RESERVED, field_value, needed_of
-from masrel.lab.protocol.content import parse_gate
+from masrel.lab.protocol.content import _gate_of
 from masrel.lab.protocol.definition import (
     _FIELD_NAME,
     ElbowConstants,
     EstimatePlan,
     GateKeys,
+    JudgeKeys,
     Model,
     Protocol,
     Question,
@@ -118,6 +119,7 @@ def _ids(protocol: Protocol) -> Iterator[str]:
         "sessions": [session.id for session in protocol.sessions],
         "questionnaires": [each.id for each in protocol.questionnaires],
         "analysis.estimates": [line.id for line in protocol.analysis.estimates],
+        "analysis.judges": [line.id for line in protocol.analysis.judges],
     }
     for key, names in ids.items():
         first: dict[str, int] = {}
@@ -698,13 +700,45 @@ def _sample_size(size: SampleSize, protocol: Protocol) -> Iterator[str]:
     )
 
 
+def _judge(line: JudgeKeys, protocol: Protocol) -> Iterator[str]:
+    # beside humans of one session, on presentations enough
+    estimates = [each.id for each in protocol.analysis.estimates]
+    raters = {session.id: session.raters for session in protocol.sessions}
+    met = raters.get(line.session, ())
+    humans = line.humans or [name for name in met if name != line.judge]
+    stray = [name for name in humans if name not in met or name == line.judge]
+    n_items = len(protocol.models) * protocol.schedule.repeats
+    return _broken(
+        (line.id in estimates, f"id: {got(line.id)} is an estimate of the plan, too"),
+        (
+            line.session not in raters,
+            f"session: needed a session of [[sessions]] ({', '.join(raters)}), got "
+            f"{got(line.session)}",
+        ),
+        (
+            met and line.judge not in met,
+            f"judge: needed a rater of the session ({', '.join(met)}), got "
+            f"{got(line.judge)}",
+        ),
+        (
+            met and (len(set(humans)) < 2 or stray),
+            f"humans: needed two raters of the session or more, beside the judge, got "
+            f"{listed(humans) or 'none'}",
+        ),
+        (
+            line.min_items > n_items,
+            f"min_items: needed at most {n_items}, the presentations of a session, got "
+            f"{line.min_items}",
+        ),
+    )
+
+
 def _gate(gate: GateKeys, protocol: Protocol) -> Iterator[str]:
     # one on an estimate of the plan
-    names = [line.id for line in protocol.analysis.estimates]
     if not gate.why.isprintable():  # it stands in a line of a table, and in XML
         yield (f"why: needed one line without control characters, got {got(gate.why)}")
     try:
-        parse_gate(gate.require, names, where="require")
+        _gate_of(gate.require, protocol, where="require")
     except ParameterError as error:
         yield str(error)
 
@@ -731,5 +765,6 @@ _RULES: tuple[tuple[str | None, Callable[..., Iterator[str]]], ...] = (
     ("analysis.estimates", _plan),
     (None, _report),
     ("analysis.sample_sizes", _sample_size),
+    ("analysis.judges", _judge),
     ("report.gates", _gate),
 )

@@ -230,7 +230,7 @@ _LATER: dict[str, Any] = {
         "torque_sensor": False,
     },
     "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
-    "analysis": {"sample_sizes": (), "estimates": [{"title": ""}]},
+    "analysis": {"sample_sizes": (), "judges": (), "estimates": [{"title": ""}]},
     "report": {"gates": (), "formats": ("html", "markdown")},
     "training": {
         "kappa_insufficient": 0.6,
@@ -401,10 +401,16 @@ def _drop_repeated(model: dict[str, Any], elbow: dict[str, Any]) -> None:
 
 # Numbers of an estimate that a gate can be about
 _NUMBERS = ("value", "low", "high", "width", "n", "n_missing", "p")
+_OF_JUDGES = ("winning_rate", "advantage")
 
 
 def parse_gate(
-    text: str, estimates: Collection[str], *, where: str, why: str = ""
+    text: str,
+    estimates: Collection[str],
+    *,
+    judges: Collection[str] = (),
+    where: str,
+    why: str = "",
 ) -> Gate:
     """Read a requirement such as ``kappa.low >= 0.4``.
 
@@ -413,8 +419,8 @@ def parse_gate(
     text : str
         Estimate and number with a dot between, one of ``>=``, ``<=``, ``>``, ``<``, and
         the limit.
-    estimates : collection of str
-        Ids of the plan's lines.
+    estimates, judges : collection of str
+        Ids of the plan's estimates, and of its judges.
     where : str
         Where it stands; a message begins with it.
     why : str, optional
@@ -435,7 +441,15 @@ def parse_gate(
     >>> str(parse_gate("kappa.low>=0.4", ["kappa"], where="--require"))
     'kappa.low >= 0.4'
     """
-    return read_gate(text, dict.fromkeys(estimates, _NUMBERS), where=where, why=why)
+    numbers = dict.fromkeys(estimates, _NUMBERS) | dict.fromkeys(judges, _OF_JUDGES)
+    return read_gate(text, numbers, where=where, why=why)
+
+
+def _gate_of(text: str, protocol: Protocol, *, where: str, why: str = "") -> Gate:
+    """Read a requirement on what the plan of a protocol has."""
+    ids = [line.id for line in protocol.analysis.estimates]
+    judges = [line.id for line in protocol.analysis.judges]
+    return parse_gate(text, ids, judges=judges, where=where, why=why)
 
 
 def gates_of(protocol: Protocol) -> tuple[Gate, ...]:
@@ -451,8 +465,7 @@ def gates_of(protocol: Protocol) -> tuple[Gate, ...]:
     tuple of Gate
         In its order.
     """
-    ids = [line.id for line in protocol.analysis.estimates]
     return tuple(
-        parse_gate(gate.require, ids, where=f"report.gates[{index}]", why=gate.why)
+        _gate_of(gate.require, protocol, where=f"report.gates[{index}]", why=gate.why)
         for index, gate in enumerate(protocol.report.gates)
     )

@@ -357,6 +357,17 @@ class EstimatePlan(_Table, frozen=True, kw_only=True):
     interval: Literal["none", IntervalMethod] = "none"
 
 
+class JudgeKeys(_Table, frozen=True, kw_only=True):
+    """``[[analysis.judges]]``: a rater who may stand for one of the others, or not."""
+
+    id: _Identifier
+    judge: _Identifier
+    session: str
+    epsilon: Annotated[float, Meta(ge=0, le=1)]
+    humans: tuple[str, ...] = ()
+    min_items: Annotated[int, Meta(ge=1)] = 30
+
+
 _Coefficient = Annotated[float, Meta(ge=-1, le=1)]
 _Chance = Annotated[float, Meta(ge=0, le=1)]
 _Width = Annotated[float, Meta(ge=0, le=100)]
@@ -397,6 +408,7 @@ class Analysis(_Table, frozen=True, kw_only=True):
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     n_resamples: Annotated[int, Meta(ge=100, le=1_000_000)] = 10_000
     estimates: tuple[EstimatePlan, ...] = ()
+    judges: tuple[JudgeKeys, ...] = ()
     sample_sizes: tuple[SampleSize, ...] = ()
 
 

@@ -87,6 +87,24 @@ _COLUMNS = (
     Column(key="chance", heading="p_e", digits=3),
     Column(key="reason", heading="Reason", where="csv"),
 )
+_OF_JUDGES = (
+    Column(key="id", heading="Id", where="csv"),
+    Column(key="judge", heading="Judge", align="left"),
+    Column(key="session", heading="Session", align="left"),
+    Column(key="n_humans", heading="Humans"),
+    Column(key="n_rejected", heading="Not worse"),
+    Column(key="winning_rate", heading="Winning rate", digits=3),
+    Column(key="advantage", heading="Advantage", digits=3),
+    Column(key="epsilon", heading="ε"),
+    Column(key="n_items", heading="Presentations"),
+    Column(key="passes", heading="Passes", align="left"),
+    Column(key="reason", heading="Reason", where="csv"),
+)
+_JUDGED = (
+    "Not worse: humans who are shown to be better than the judge by less than ε, if at "
+    "all; half of them are enough (alternative annotator test). Advantage: how often "
+    "the judge is as close to the others as a human is, or closer; mean over humans."
+)
 _SHORT = ("title", "value", "interval_shown", "n_items", "n_raters")
 
 
@@ -102,8 +120,35 @@ def estimates_section(material: Material) -> Iterator[Content]:
         caption = "Estimates of agreement"
         yield replace(table, caption=caption, columns=short, notes=notes)
         yield _forest(material, rows, "agreement", "Agreement")
+        yield from judge_tables(material)
         yield SUPPLEMENT
         yield table
+
+
+def judge_tables(material: Material) -> Iterator[Table]:
+    """Show whether a judge of the plan may stand for a human; nothing without one."""
+    rows: list[dict[str, Value]] = []
+    for entry in material.analysis.judges:
+        line, result = entry.line, entry.result
+        cells: dict[str, Value] = {"id": line.id, "judge": line.judge}
+        cells |= {"session": line.session, "reason": entry.reason}
+        if result is not None:
+            cells |= {
+                "n_humans": len(result.humans),
+                "n_rejected": sum(human.is_rejected for human in result.humans),
+                "winning_rate": result.winning_rate,
+                "advantage": result.advantage,
+                "epsilon": result.epsilon,
+                "n_items": result.n_items,
+                "passes": "yes" if result.is_passed else "no",
+            }
+        rows.append(cells)
+    if rows:
+        whys = (f"{row['judge']}: {row['reason']}." for row in rows if row["reason"])
+        caption, notes = "Judges beside the raters", (_JUDGED, *whys)
+        yield table_of(
+            "judges", caption, _OF_JUDGES, rows, data=material.data, notes=notes
+        )
 
 
 def retest_section(material: Material) -> Iterator[Content]:

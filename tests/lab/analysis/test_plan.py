@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import random
 import warnings
 from fractions import Fraction
 from typing import Any
@@ -18,11 +19,25 @@ from masrel.errors import (
 )
 from masrel.estimates import Estimate
 from masrel.intervals import estimate
-from masrel.lab.analysis import PlannedEstimate, analyze
-from masrel.lab.protocol import EstimatePlan, ScaleDefinition, scale_of
+from masrel.judges import alternative_annotator_test
+from masrel.lab.analysis import PlannedEstimate, analyze, check_gates
+from masrel.lab.protocol import (
+    EstimatePlan,
+    JudgeKeys,
+    ScaleDefinition,
+    parse_gate,
+    scale_of,
+)
 from masrel.lab.ratings import Ratings, ratings_from_rows
 from tests.architecture.test_imports import loaded_after
-from tests.lab.analysis.studies import of_session, plan, protocol_with, ratings, table_v
+from tests.lab.analysis.studies import (
+    hess2012,
+    of_session,
+    plan,
+    protocol_with,
+    ratings,
+    table_v,
+)
 
 TWO = ratings(
     *of_session("test", R1=("1", "1+", "2", "3"), R2=("1", "1", "2", "3")),
@@ -46,6 +61,45 @@ def refusal(line: EstimatePlan, rows: Ratings) -> str | None:
     except MasrelError as error:
         return str(error)
     return None if found.estimate is not None or found.by_rater else found.reason
+
+
+def test_a_judge_is_held_against_the_others_of_its_session() -> None:
+    draw = random.Random(4).choice
+    rows = [
+        ("test", rater, model.id, draw(("1", "1", "2", None)))
+        for model in hess2012().models
+        for rater in ("R1", "R2", "R3", "R4")
+    ]
+    graded = {
+        rater: {model: grade for _, of, model, grade in rows if of == rater}
+        for rater in ("R1", "R2", "R3", "R4")
+    }
+    judge = JudgeKeys(id="m", judge="R4", session="test", epsilon=0.2, min_items=5)
+    lines = (
+        judge,
+        msgspec.structs.replace(judge, id="two", humans=("R1", "R3")),
+        msgspec.structs.replace(judge, id="late", session="retest"),
+    )
+    protocol = protocol_with()
+    plan = msgspec.structs.replace(protocol.analysis, judges=lines)
+    protocol = msgspec.structs.replace(protocol, analysis=plan)
+    analysis = analyze(protocol, ratings(*rows))
+    humans = (("R1", "R2", "R3"), ("R1", "R3"), ())
+    for found, names in zip(analysis.judges, humans, strict=True):
+        expected = names and alternative_annotator_test(
+            {name: graded[name] for name in names},
+            graded["R4"],
+            epsilon=0.2,
+            min_items=5,
+        )
+        assert found.result == (expected or None)
+    gates = [
+        parse_gate(f"{of}.advantage >= 0", (), judges=("m", "late"), where="plan")
+        for of in ("m", "late")
+    ]
+    holds = check_gates(analysis, gates)
+    assert [result.holds for result in holds] == [True, False]
+    assert holds[1].reason is not None
 
 
 def test_what_is_not_there_is_a_reason() -> None:

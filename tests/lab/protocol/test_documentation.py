@@ -34,6 +34,7 @@ TABLES = {
     "[training]": definition.Training,
     "[analysis]": definition.Analysis,
     "[[analysis.estimates]]": definition.EstimatePlan,
+    "[[analysis.judges]]": definition.JudgeKeys,
     "[[analysis.sample_sizes]]": definition.SampleSize,
     "[report]": definition.Report,
     "[[report.gates]]": definition.GateKeys,
@@ -75,6 +76,7 @@ def test_every_table_of_a_protocol_is_there() -> None:
     fields = {field.name for field in msgspec.structs.fields(Protocol)}
     inner = {
         "analysis.estimates",
+        "analysis.judges",
         "analysis.sample_sizes",
         "models.constants",
         "questionnaires.questions",

@@ -191,6 +191,31 @@ SIZES = [
 ]
 
 
+JUDGE: dict[str, Any] = {
+    "id": "machine",
+    "judge": "R3",
+    "session": "test",
+    "epsilon": 0.2,
+    "min_items": 2,
+}
+JUDGES = [
+    ({"humans": ["R1"]}, "judges[0].humans: needed two raters of the session or more"),
+    ({"humans": ["R1", "R3"]}, "judges[0].humans: needed two raters of the session"),
+    ({"id": "kappa"}, 'judges[0].id: "kappa" is an estimate of'),
+    ({"judge": "R4"}, "judges[0].judge: needed a rater of the session (R1, R2, R3)"),
+    ({"session": "pre", "humans": ["R1", "R2"]}, "judges[0].session: needed a session"),
+    ({"min_items": 3}, "judges[0].min_items: needed at most 2"),
+    ({"epsilon": 2}, "judges[0].epsilon: needed a number at least 0"),
+]
+
+
+def with_judge(keys: dict[str, Any]) -> dict[str, Any]:
+    document = changed("analysis", "judges", to=[JUDGE | keys])
+    document["raters"].append({"id": "R3"})
+    document["sessions"][0]["raters"].append("R3")
+    return document
+
+
 def cases() -> list[tuple[dict[str, Any], str]]:
     """Protocols with one mistake each, and how its sentence begins."""
     every = [
@@ -228,6 +253,7 @@ def cases() -> list[tuple[dict[str, Any], str]]:
         )
         for sizes, problem in SIZES
     ]
+    every += [(with_judge(keys), f"analysis.{problem}") for keys, problem in JUDGES]
     every += [
         (
             changed("report", "gates", to=[{"require": "kappa.n >= 5", "why": why}]),
