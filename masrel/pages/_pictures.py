@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -192,30 +192,61 @@ _DRAWERS = {
 }
 
 
+class _Forest(NamedTuple):
+    """How rows of an answer about judges are drawn beside each other."""
+
+    label: str  # key of what a row is called
+    value: str  # key of the number; its ends begin with it, or have no more to them
+    axis: str
+    caption: str
+    margin: float = 0.0  # where ε is marked, as a multiple of it
+
+
+_FORESTS = {
+    "humans": _Forest(
+        "human",
+        "difference",
+        "human's share less the judge's",
+        "How much more often than the judge each human is at least as close to the "
+        "other humans, with {level} % confidence intervals (Tango): where ε = "
+        "{epsilon:g} is excluded the judge is not worse.",
+        1.0,
+    ),
+    "judge_reference": _Forest(
+        "human",
+        "difference",
+        "judge's share of right grades less the human's",
+        "How much more often than the human the judge has the grade of {reference}, "
+        "with {level} % confidence intervals (Tango): where ε = {epsilon:g} in favour "
+        "of the human is excluded the judge is not worse.",
+        -1.0,
+    ),
+    "rates": _Forest(
+        "name",
+        "value",
+        "share of items with the grade {grade}",
+        "How often {grade} is right, by the judge alone, corrected for its errors in "
+        "two ways, and by labels alone, with {level} % confidence intervals.",
+    ),
+    "strengths": _Forest(
+        "model",
+        "value",
+        "strength: logarithm of the odds against an average answer",
+        "Which answer each judge prefers (Bradley-Terry), with {level} % confidence "
+        "intervals.",
+    ),
+}
+
+
 def judge_drawings(answers: Sequence[Answer], level: float) -> Iterator[Drawing]:
-    """Return each human beside a judge, and rates; nothing where none was asked for."""
+    """Return each human beside a judge, rates, strengths; nothing where none is."""
     by_name = {answer.name: answer.shown or [] for answer in answers}
-    if rows := by_name.get("humans"):
-        epsilon = by_name["judges"][0]["epsilon"]
-        yield _judge_drawing(
-            "judges",
-            [_forest_row(of, "human", "difference", level) for of in rows],
-            "human's share less the judge's",
-            "How much more often than the judge each human is at least as close to "
-            f"the other humans, with {percent(level)} % confidence intervals (Tango): "
-            f"where ε = {epsilon:g} is excluded the judge is not worse.",
-            mark=(epsilon, f"ε = {epsilon:g}: worse by so much is too much"),
-        )
-    if rows := by_name.get("rates"):
-        grade = rows[0]["grade"]
-        yield _judge_drawing(
-            "rates",
-            [_forest_row(of, "name", "value", level) for of in rows],
-            f"share of items with the grade {grade}",
-            f"How often {grade} is right, by the judge alone, corrected for its errors "
-            f"in two ways, and by labels alone, with {percent(level)} % confidence "
-            "intervals.",
-        )
+    for name, forest in _FORESTS.items():
+        if rows := by_name.get(name):
+            of = (
+                (by_name.get("judges") or rows)[0] | rows[0] | {"level": percent(level)}
+            )
+            yield _judge_drawing(name, forest, rows, of, level)
 
     if rows := by_name.get("truth_confusion"):
         grades = [row["class"] for row in by_name["truth"] or ()]
@@ -237,8 +268,9 @@ def judge_drawings(answers: Sequence[Answer], level: float) -> Iterator[Drawing]
         )
 
 
-def _forest_row(row: Row, label: str, key: str, level: float) -> ForestRow:
-    start = "" if key == "value" else f"{key}_"
+def _forest_row(row: Row, forest: _Forest, level: float) -> ForestRow:
+    key = forest.value
+    start = f"{key}_" if f"{key}_low" in row else ""
     numbers = (row.get(of) for of in (key, f"{start}low", f"{start}high"))
     value, low, high = (math.nan if x is None else x for x in numbers)
     ends = None
@@ -249,7 +281,7 @@ def _forest_row(row: Row, label: str, key: str, level: float) -> ForestRow:
         )  # fmt: skip
     text = number(value, 3)
     return ForestRow(
-        label=row[label],
+        label=row[forest.label],
         detail=f"p {p_text(row['p_value'])}" if "p_value" in row else "",
         value=value if math.isfinite(value) else None,
         interval=ends,
@@ -260,20 +292,23 @@ def _forest_row(row: Row, label: str, key: str, level: float) -> ForestRow:
 
 
 def _judge_drawing(
-    name: str,
-    rows: Sequence[ForestRow],
-    axis: str,
-    caption: str,
-    mark: tuple[float, str] | None = None,
+    name: str, forest: _Forest, shown: Sequence[Row], of: Row, level: float
 ) -> Drawing:
-    ends = [row.interval.high for row in rows if row.interval] or [1.0]
-    right = 1.03 if mark is None else max(*ends, mark[0]) + 0.05
+    rows = [_forest_row(row, forest, level) for row in shown]
+    ends, right, mark = [row.interval.high for row in rows if row.interval], 1.03, None
+    if forest.margin:
+        at = forest.margin * of["epsilon"]
+        mark = at, f"ε = {of['epsilon']:g}: worse by so much is too much"
+        right = max(*(ends or [1.0]), at) + 0.05
+    elif name == "strengths":
+        right = max(ends or [1.0]) * 1.05
     texts = "; ".join(f"{row.label} ({row.group}): {row.text}" for row in rows)
+    caption = forest.caption.format(**of)
     return Drawing(
         name=name,
         caption=caption,
         alt=f"{caption} {texts}.",
-        content=Drawn(FOREST, (rows, axis, right, mark)),
+        content=Drawn(FOREST, (rows, forest.axis.format(**of), right, mark)),
         stamp="",
     )
 

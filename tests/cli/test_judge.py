@@ -229,8 +229,10 @@ def test_preferences_are_those_of_the_functions(masrel: Caller, tmp_path: Path) 
         for item, first, _, best in rows
     ]
     file = written(tmp_path, table)
-    done = masrel("judge", file, "--order", "first", "--json", "-")
-    shown = json.loads(done.out)
+    picture = tmp_path / "strengths.svg"
+    call = ("judge", file, "--order", "first", "--figure", picture)
+    shown = json.loads(masrel(*call, "--json", "-").out)
+    assert "<svg" in picture.read_text("utf-8")
     bias, fit = position_bias(rows), bradley_terry(rows)
     (row,) = shown["preferences"]
     for key in ("value", "low", "high", "agreement", "n_pairs", "n_ties", "n_unpaired"):
