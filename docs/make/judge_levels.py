@@ -5,6 +5,7 @@
 """
 
 import csv
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import product
@@ -59,13 +60,26 @@ def exact_rows(sizes: Sequence[int]) -> Iterator[Row]:
     for n, test, (name, bound), epsilon in product(
         sizes, TESTS, BOUNDS.items(), EPSILONS
     ):
-        largest = rejected(n, epsilon, bound, test)
+        largest = _by_t(n, epsilon, bound)
+        if test != "t":
+            largest = rejected(n, epsilon, bound, test)
         at = (n, test, name, epsilon)
         yield _row("level", *at, "", worst(largest, epsilon))
         for share, power in zip(
             SHARES, region_share(largest, 0.0, np.array(SHARES) / 2), strict=True
         ):
             yield _row("power", *at, share, power)
+
+
+def _by_t(n: int, epsilon: float, bound: float) -> Integers:
+    """Return, for each c, the largest b that Student's t rejects; -1 for none."""
+    counts = [
+        bisect_right(
+            range(n - c + 1), bound, key=lambda b: p_less(b, c, n, epsilon, "t")
+        )
+        for c in range(n + 1)
+    ]
+    return np.array(counts) - 1
 
 
 def family_rows(n_studies: int, epsilon: float = 0.1) -> Iterator[Row]:

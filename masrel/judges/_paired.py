@@ -5,7 +5,6 @@ with its interval, and p-values that are exact, or Student's.
 """
 
 import math
-from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -13,8 +12,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import bdtr, gammaln, ndtr, ndtri, stdtr, xlog1py, xlogy
 
-from masrel._input import shown
+from masrel._input import refuse, shown
 from masrel.agreement._engine import Floats, Integers, check_level, undefined
 from masrel.errors import ParameterError
 
@@ -129,11 +129,13 @@ def score_test(
     >>> round(result.low, 4), round(result.high, 4)
     (-0.0855, 0.1922)
     """
-    b, c, n = _checked_counts(b, c, n)
+    check_count("b", b, 0)
+    check_count("c", c, 0)
+    check_count("n", n)
+    refuse((b + c > n, f"n: needs at least the {b} + {c} of b and c, got {n}"))
     check_share("delta", delta, -1.0)
     check_level(level)
-    from scipy.special import ndtr, ndtri  # loaded only for a p-value
-
+    b, c, n = int(b), int(c), int(n)
     z, reason = float(tango(b, c, n, delta)), None
     if math.isnan(z):
         reason = undefined("score_test", NO_CHANGE)
@@ -155,15 +157,6 @@ def score_test(
         level=level,
         reason=reason,
     )
-
-
-def _checked_counts(b: int, c: int, n: int) -> tuple[int, int, int]:
-    check_count("b", b, 0)
-    check_count("c", c, 0)
-    check_count("n", n)
-    if b + c > n:
-        raise ParameterError(f"n: needs at least the {b} + {c} of b and c, got {n}")
-    return int(b), int(c), int(n)
 
 
 def check_count(name: str, count: object, fewest: int = 1) -> None:
@@ -215,19 +208,14 @@ def _upper_end(b: int, c: int, n: int, quantile: float) -> float:
 
 def p_less(b: int, c: int, n: int, delta: float, test: PairedTest) -> float:
     """Return the p-value of p_b - p_c ≥ delta against its being less."""
-    return _P_VALUES[test](b, c, n, delta)
-
-
-def _score_p(b: int, c: int, n: int, delta: float) -> float:
-    from scipy.special import ndtr
-
-    return float(ndtr(tango(b, c, n, delta)))
-
-
-def _t_p(b: int, c: int, n: int, delta: float) -> float:
-    """Return the p-value of Student's t of b ones, c minus ones and zeros."""
-    from scipy.special import stdtr
-
+    z = tango(b, c, n, delta)
+    if test == "exact":  # ordered by z, of the nuisance where it is largest
+        bound = float(np.nan_to_num(z, nan=0.0, neginf=-math.inf))
+        region = lower_region(bound, n, delta)
+        return maximum(partial(region_share, region, delta), n, delta)
+    if test == "score":
+        return float(ndtr(z))
+    # Student's, of b ones, c minus ones and zeros
     mean = (b - c) / n
     variance = (n * (b + c) - (b - c) ** 2) / (n * n * max(n - 1, 1))  # of the mean
     if variance > 0.0:
@@ -235,36 +223,16 @@ def _t_p(b: int, c: int, n: int, delta: float) -> float:
     return math.nan if mean == delta else float(mean > delta)
 
 
-def _exact_p(b: int, c: int, n: int, delta: float) -> float:
-    """Return the exact p-value, ordered by z, of the nuisance where it is largest."""
-    z = float(np.nan_to_num(tango(b, c, n, delta), nan=0.0, neginf=-math.inf))
-    return maximum(partial(region_share, lower_region(z, n, delta), delta), n, delta)
-
-
-_P_VALUES: dict[PairedTest, Callable[[int, int, int, float], float]] = {
-    "exact": _exact_p,
-    "score": _score_p,
-    "t": _t_p,
-}
-
-
-def rejected(n: int, delta: float, bound: float, test: PairedTest) -> Integers:
+def rejected(
+    n: int, delta: float, bound: float, test: Literal["exact", "score"]
+) -> Integers:
     """Return, for each c, the largest b with a p-value of at most a bound; -1 for none.
 
     Of the exact test it is a region of the score test with another bound of z.
     """
     # -> (n + 1,)
-    from scipy.special import ndtri
-
     if test == "score":
         return lower_region(float(ndtri(bound)), n, delta)
-    if test == "t":
-        p_of = partial(_t_p, n=n, delta=delta)
-        counts = (
-            bisect_right(range(n - c + 1), bound, key=partial(p_of, c=c))
-            for c in range(n + 1)
-        )
-        return np.fromiter(counts, dtype=np.int64) - 1
     low, high = _LOWEST_Z, 0.0
     inner, outer = (lower_region(z, n, delta) for z in (low, high))
     while high - low > _TIED and (outer - inner).sum() > 1:
@@ -286,8 +254,6 @@ def p_less_of_clusters(d: Integers, clusters: Integers, delta: float) -> float:
     alike, are joined to them.
     """
     # d (n_items,): 1, -1 or 0; clusters (n_items,): codes
-    from scipy.special import stdtr
-
     n, sizes = len(d), np.bincount(clusters)
     sums, sizes = np.bincount(clusters, d)[sizes > 0], sizes[sizes > 0]
     b, c, n_clusters = int((d == 1).sum()), int((d == -1).sum()), len(sizes)
@@ -324,8 +290,6 @@ def lower_region(z: float, n: int, delta: float) -> Integers:
 def region_share(largest: Integers, delta: float, q: Floats) -> Floats:
     """Return the probability of b ≤ largest[c] where p_c = q and p_b = q + delta."""
     # largest (n + 1,), q (n_places,) -> (n_places,)
-    from scipy.special import bdtr, gammaln, xlog1py, xlogy
-
     n = len(largest) - 1
     c = np.arange(n + 1)
     ways = gammaln(n + 1) - gammaln(c + 1) - gammaln(n - c + 1)

@@ -13,6 +13,8 @@ from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.special import stdtr
 
 from masrel._input import check_option, listed, refuse, shown
 from masrel.agreement import (
@@ -23,12 +25,20 @@ from masrel.agreement import (
     declared_weights,
     holm,
 )
-from masrel.agreement._engine import NO_SPREAD, Floats, Integers, check_level, undefined
+from masrel.agreement._engine import (
+    NO_SPREAD,
+    Floats,
+    Integers,
+    check_level,
+    divide,
+    undefined,
+)
 from masrel.agreement._labels import check_categories, label_codes
 from masrel.agreement.benchmarks import _yekutieli_bounds
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._question import student_t, warn_small
+from masrel.intervals.jackknife import _variance_of
 from masrel.judges._paired import (
     NO_CHANGE,
     PairedTest,
@@ -276,11 +286,10 @@ def alternative_annotator_test(
     graded = _graded(humans, {"judge": judge}, score, min_items)
     units = None if clusters is None else graded.cluster_codes(clusters)
     nearer, n_items = graded.nearer()[0], graded.rated.sum(axis=0).tolist()
-    rows = []
-    for j in np.flatnonzero(graded.is_tested):
-        rated = graded.rated[:, j]
-        of = None if units is None else units[rated]
-        rows.append(_human(graded.names[j], nearer[rated, j], epsilon, test, of))
+    rows = [
+        _human(graded, nearer, int(j), epsilon, test, units)
+        for j in np.flatnonzero(graded.is_tested)
+    ]
     m = len(rows)
     # what is undefined rejects nothing, and is of one of the humans all the same
     known = [1.0 if row["reason"] else row["p_value"] for row in rows]
@@ -311,22 +320,27 @@ def alternative_annotator_test(
 
 
 def _human(
-    name: str, nearer: Integers, epsilon: float, test: str, units: Integers | None
+    graded: "_Graded",
+    nearer: Integers,
+    j: int,
+    epsilon: float,
+    test: str,
+    units: Integers | None,
 ) -> dict[str, Any]:
     """Return the line of one human, before the others are regarded."""
-    # nearer (n_items,): 1 where the human is, -1 where the judge is
-    n, b, c = len(nearer), int((nearer == 1).sum()), int((nearer == -1).sum())
+    # nearer (n_items, n_humans): 1 where the human is, -1 where the judge is
+    name, rated = graded.names[j], graded.rated[:, j]
+    d = nearer[rated, j]
+    n, b, c = len(d), int((d == 1).sum()), int((d == -1).sum())
     way: Any = test
     if units is not None:
-        way, p = "clusters", p_less_of_clusters(nearer, units, epsilon)
+        way, p = "clusters", p_less_of_clusters(d, units[rated], epsilon)
     else:
         if test == "auto":
             way = "exact" if n <= _EXACT_UP_TO else "score"
         p = p_less(b, c, n, epsilon, way)
-    reason = None
-    if math.isnan(p):
-        why = NO_CHANGE if units is None else _NO_CLUSTERS
-        reason = undefined(f"the p-value of {name}", why)
+    why = NO_CHANGE if units is None else _NO_CLUSTERS
+    reason = undefined(f"the p-value of {name}", why) if math.isnan(p) else None
     return {
         "name": name,
         "n_items": n,
@@ -360,33 +374,27 @@ class _Graded:
     def nearer(self) -> Integers:
         """Return 1 where a human is nearer to the others, -1 where a judge is."""
         # -> (n_judges, n_items, n_humans); whole numbers are exact, of any size
-        n_humans = len(self.names)
-        of_humans: Any = 0
-        of_judges = []
-        for k in range(n_humans):
-            grade, is_there = self.humans[:, k, None], self.rated[:, k, None]
-            to_k = self.nearness(self.humans, grade) * is_there
-            to_k[:, k] = 0  # nobody is held against himself
-            of_humans = of_humans + to_k
-            of_judges.append(self.nearness(self.judges, grade) * is_there)
-        by_human = np.stack(of_judges, axis=-1)  # (n_items, n_judges, n_humans)
+        every = range(len(self.names))
+        of_humans: Any = sum(  # nobody is held against himself
+            self._to(k, self.humans) * (np.array(every) != k) for k in every
+        )
+        by_human = np.stack([self._to(k, self.judges) for k in every], axis=-1)
         of_judge = by_human.sum(axis=-1, keepdims=True) - by_human
         gap = np.moveaxis(of_humans[:, None, :] - of_judge, 1, 0)
         rounding = _ROUNDING * np.abs(of_judge).max() if gap.dtype.kind == "f" else 0
         signs = (gap > rounding).astype(np.int8) - (gap < -rounding).astype(np.int8)
         return np.asarray(signs * self.rated)
 
-    def without(self, j: int) -> "_Graded":
-        """Return the same without one human, whom nobody is held against then."""
-        rated = self.rated & (np.arange(len(self.names)) != j)
-        return replace(self, rated=rated & (rated.sum(axis=1, keepdims=True) >= 2))
+    def _to(self, k: int, grades: NDArray[Any]) -> NDArray[Any]:
+        """Return how near grades are to those of a human; 0 where there is none."""
+        return self.nearness(grades, self.humans[:, k, None]) * self.rated[:, k, None]
 
     def cluster_codes(self, clusters: Grades | None) -> Integers:
         """Return the cluster of every item as numbers from 0; without any, the item."""
         # -> (n_items,)
         if clusters is None:
             return np.arange(len(self.items))
-        of = _by_item(clusters, "clusters")
+        of = by_item(clusters, "clusters")
         codes, _ = label_codes([list(map(of.get, self.items))], None)
         if (codes < 0).any():
             item = self.items[int(codes[0].argmin())]
@@ -403,31 +411,20 @@ def _graded(
     """Check grades; code those of items with two humans' and all judges' grades."""
     check_count("min_items", min_items)
     title, declared, weights = _checked_score(score)
-    by_human = {
-        str(name): _by_item(grades, f"humans: {name}")
-        for name, grades in _by_item(humans, "humans").items()
-    }
-    by_judge = [_by_item(grades, name) for name, grades in judges.items()]
-    n, graders = len(by_human), [*by_human.values(), *by_judge]
-    items = [item for item in by_judge[0] if all(item in of for of in by_judge)]
-    places = [*(f"humans: {name}" for name in by_human), *judges]
-    codes, categories = label_codes(
-        [list(map(of.get, items)) or [None] for of in graders],
-        declared,
-        lambda row, column: f"{places[row]}: item {items[column]!r}",
-    )
-    codes = np.ascontiguousarray(codes.T)  # (n_items, n_graders)
+    of_humans = {str(name): of for name, of in by_item(humans, "humans").items()}
+    n, graders = len(of_humans), {f"humans: {who}": of for who, of in of_humans.items()}
+    items, codes, categories = _coded({**graders, **judges}, list(judges), declared)
     is_there = codes >= 0
     does_count = is_there[:, n:].all(axis=1) & (is_there[:, :n].sum(axis=1) >= 2)
     if not does_count.any():
         raise RatingsError(
             f"{listed(judges)}: needs items that two humans have graded, too; none of "
-            f"{len(items)} is, such as {shown(next(iter(by_judge[0]), None))}"
+            f"{len(items)} is, such as {shown(next(iter(items), None))}"
         )
     rated = is_there[does_count, :n]
     n_items = rated.sum(axis=0)
     if not (n_items >= min_items).any():
-        each = zip(by_human, n_items.tolist(), strict=True)
+        each = zip(of_humans, n_items.tolist(), strict=True)
         raise ParameterError(
             f"min_items: needs a human with at least {min_items} items that another "
             "human and the judge have graded, got "
@@ -435,7 +432,7 @@ def _graded(
         )
     values, nearness = _values(title, codes[does_count], categories, weights)
     return _Graded(
-        names=list(by_human),
+        names=list(of_humans),
         items=[items[row] for row in np.flatnonzero(does_count)],
         humans=values[:, :n],
         rated=rated,
@@ -447,19 +444,35 @@ def _graded(
     )
 
 
-def _by_item(grades: Any, place: str) -> dict[Any, Any]:
+def _coded(
+    graders: Mapping[str, Grades],
+    needed: Sequence[str],
+    declared: tuple[Label, ...] | None = None,
+) -> tuple[list[Hashable], Integers, tuple[Label, ...]]:
+    """Return the items of those who are needed, codes of all, and the categories."""
+    # graders: by their places for messages -> codes (n_items, n_graders)
+    grades = {place: by_item(of, place) for place, of in graders.items()}
+    items = [x for x in grades[needed[0]] if all(x in grades[of] for of in needed)]
+    codes, categories = label_codes(
+        [list(map(of.get, items)) or [None] for of in grades.values()],
+        declared,
+        lambda row, column: f"{list(grades)[row]}: item {items[column]!r}",
+    )
+    return items, np.ascontiguousarray(codes.T), categories
+
+
+def by_item(grades: Any, place: str) -> dict[Any, Any]:
     """Return what there is by item, once each."""
-    pairs = list(grades.items()) if hasattr(grades, "items") else None
-    if pairs is None:
+    if not hasattr(grades, "items"):
         raise RatingsError(
             f"{place}: needs a dict, a Series or a DataFrame, got {shown(grades)}"
         )
-    by_item = dict(pairs)
-    if len(by_item) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for i, name in enumerate(names) if name in names[:i])
-        raise RatingsError(f"{place}: needs each name once, got {twice!r} twice")
-    return by_item
+    once: dict[Any, Any] = {}
+    for name, of in grades.items():
+        if name in once:
+            raise RatingsError(f"{place}: needs each name once, got {name!r} twice")
+        once[name] = of
+    return once
 
 
 def _checked_score(
@@ -484,13 +497,8 @@ def _values(
         return codes, lambda a, b: -weights.v[a, b]
     if score == "accuracy":
         return codes, lambda a, b: np.equal(a, b).astype(np.int64)
-    # of equally many others a larger mean square is a larger sum of squares
-    whole = _whole_numbers(categories, codes.shape[1])
-    return whole[codes], lambda a, b: -((a - b) ** 2)
-
-
-def _whole_numbers(categories: Sequence[Label], n_graders: int) -> NDArray[Any]:
-    """Return grades as whole numbers, in the proportions of the decimals they are."""
+    # of equally many others a larger mean square is a larger sum of squares. Grades are
+    # made whole numbers, in the proportions of the decimals they are.
     others = [x for x in categories if not isinstance(x, int)]
     if not all(isinstance(x, float) and math.isfinite(x) for x in others):
         raise RatingsError(
@@ -500,8 +508,9 @@ def _whole_numbers(categories: Sequence[Label], n_graders: int) -> NDArray[Any]:
     exact = [Fraction(x if isinstance(x, int) else str(x)) for x in categories]
     scale = math.lcm(*(x.denominator for x in exact))
     whole = [int((x - min(exact)) * scale) for x in exact]
-    fits = max(whole) ** 2 * n_graders < 2**62
-    return np.array(whole, dtype=np.int64 if fits else object)
+    fits = max(whole) ** 2 * codes.shape[1] < 2**62
+    values = np.array(whole, dtype=np.int64 if fits else object)
+    return values[codes], lambda a, b: -((a - b) ** 2)
 
 
 # -- how sure the advantage is ---------------------------------------------------------
@@ -589,7 +598,8 @@ def advantage(
     of = {"judge": judge}
     rest = _leave_out(humans, of, target, score, min_items, level, clusters)
     graded, value, interval = rest.graded, float(rest.values[0]), rest.interval
-    error = math.nan
+    error = low = high = math.nan
+    method, reason = interval.method, None
     if 0.0 < value < 1.0:
         error, reason = rest.error(np.ones(1))
         # symmetric on the logit, by whose slope the error is multiplied
@@ -597,22 +607,19 @@ def advantage(
         odds = value / (1.0 - value)
         low, high = (1.0 / (1.0 + math.exp(-x) / odds) for x in (-half, half))
         method = f"{interval.method} on the logit"
-        interval = replace(interval, low=low, high=high, method=method, reason=reason)
     elif target == "items":
         # of n units none was otherwise: Clopper and Pearson's interval
         share = (0.5 - 0.5 * level) ** (1.0 / (rest.df + 1.0))
         low, high = (share, 1.0) if value else (0.0, 1.0 - share)
         method = f"exact, all {interval.unit} being alike"
-        interval = replace(interval, low=low, high=high, method=method)
     else:
-        undefined("the interval of the advantage", _AT_THE_END)
-        interval = replace(interval, reason=_AT_THE_END)
+        reason = undefined("the interval of the advantage", _AT_THE_END)
     return Estimate(
         coefficient="advantage",
         weights=graded.score,
         value=value,
         standard_error=error,
-        interval=interval,
+        interval=replace(interval, low=low, high=high, method=method, reason=reason),
         observed=value,
         chance=math.nan,
         n_items=len(graded.items),
@@ -728,7 +735,7 @@ def advantage_differences(
     >>> round(pair.value, 3), round(pair.interval.low, 3)
     (0.067, 0.002)
     """
-    by_name = {str(name): grades for name, grades in _by_item(judges, "judges").items()}
+    by_name = {str(name): grades for name, grades in by_item(judges, "judges").items()}
     if len(by_name) < 2:
         raise ParameterError(f"judges: needs at least two, got {len(by_name)}")
     rest = _leave_out(humans, by_name, target, score, min_items, level, clusters)
@@ -744,8 +751,6 @@ def advantage_differences(
 
 def _difference(rest: "_LeftOut", contrast: Floats) -> dict[str, Any]:
     """Return what is to be said of two judges, before other pairs are regarded."""
-    from scipy.special import stdtr  # loaded only for a p-value
-
     value, (error, reason) = float(contrast @ rest.values), rest.error(contrast)
     half = student_t(rest.interval.level, rest.df) * error
     low, high = max(value - half, -1.0), min(value + half, 1.0)
@@ -772,14 +777,10 @@ class _LeftOut:
 
     def error(self, contrast: Floats) -> tuple[float, str | None]:
         """Return the standard error of a contrast of judges; or why there is none."""
-        variance = 0.0
-        for moved in self.moved:  # (n - 1)/n Σ (θ_i - mean)² [2]_, of each kind
-            without = contrast @ moved
-            n = len(without)
-            variance += (n - 1) / n * float(((without - without.mean()) ** 2).sum())
-        reason = _NO_ITEM if math.isnan(variance) else NO_SPREAD
-        if math.sqrt(variance) > _ROUNDING:
+        variance = sum(_variance_of(contrast @ of, of.shape[1]) for of in self.moved)
+        if variance > 0.0:
             return math.sqrt(variance), None
+        reason = _NO_ITEM if math.isnan(variance) else NO_SPREAD
         return math.nan, undefined("the interval of the advantage", reason)
 
 
@@ -836,15 +837,13 @@ def _without_units(
 ) -> tuple[Floats, int]:
     """Return advantages without each unit, and the units of the human with fewest."""
     # -> (n_judges, n_units)
-    n_items = np.zeros((units.max() + 1, int(graded.is_tested.sum())))
-    np.add.at(n_items, units, graded.rated[:, graded.is_tested])
-    b = np.zeros((len(lost), *n_items.shape))
-    for of_judge, is_lost in zip(b, lost[:, :, graded.is_tested], strict=True):
-        np.add.at(of_judge, units, is_lost)
-    b, n_items = b[:, n_items.any(axis=1)], n_items[n_items.any(axis=1)]
+    one_hot = sparse.csr_array((np.ones(len(units)), (units, np.arange(len(units)))))
+    n_items = one_hot @ graded.rated[:, graded.is_tested]
+    b = np.stack([one_hot @ of for of in lost[:, :, graded.is_tested]])
+    is_unit = n_items.any(axis=1)
+    b, n_items = b[:, is_unit], n_items[is_unit]
     left = n_items.sum(axis=0) - n_items
-    left[left == 0.0] = math.nan
-    shares = 1.0 - (b.sum(axis=1, keepdims=True) - b) / left
+    shares = 1.0 - divide(b.sum(axis=1, keepdims=True) - b, left)
     return shares.mean(axis=2), int((n_items > 0).sum(axis=0).min())
 
 
@@ -856,7 +855,11 @@ def _without_humans(graded: _Graded, target: Target) -> Floats:
             f'target: "{target}" needs at least 3 humans, because one is left out; got '
             f"{len(tested)}"
         )
-    rest = [graded.without(int(j)) for j in tested]
+    rest = []
+    for j in tested:  # whom nobody is held against then
+        rated = graded.rated & (np.arange(len(graded.names)) != j)
+        both = rated & (rated.sum(axis=1, keepdims=True) >= 2)
+        rest.append(replace(graded, rated=both))
     return np.stack([_advantages(of.nearer() == 1, of) for of in rest], axis=1)
 
 
@@ -921,13 +924,7 @@ def reference_difference(
     """
     check_share("epsilon", epsilon)
     places = {"human": human, "judge": judge, "reference": reference}
-    by_item = [_by_item(grades, place) for place, grades in places.items()]
-    items = [item for item in by_item[0] if all(item in of for of in by_item)]
-    codes, _ = label_codes(
-        [[of[item] for of in by_item] for item in items] or [[None] * 3],
-        None,
-        lambda row, column: f"{list(places)[column]}: item {items[row]!r}",
-    )
+    _, codes, _ = _coded(places, list(places))
     codes = codes[(codes >= 0).all(axis=1)]
     if not len(codes):
         raise RatingsError("reference: needs items that human and judge graded, too")

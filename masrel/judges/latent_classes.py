@@ -8,7 +8,7 @@ several judges are worth who err together.
 import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from scipy import sparse
@@ -24,11 +24,9 @@ from masrel.intervals._question import recorded_generator, student_t, warn_small
 from masrel.intervals.jackknife import _variance_of
 from masrel.judges._paired import check_count
 
-_Start = Literal["majority", "highest"]
-"""Where the answer comes from: the shares of votes, or the best of all starts."""
-
 _SETTLED = 1e-10  # largest move of a posterior at which EM ends
 _MAX_STEPS = 5000
+_N_STARTS = 20  # others, drawn around the shares of votes
 _SEARCH = 2000, 300, 1e-6  # patterns, steps and largest move of the other starts
 _HIGHER = 1e-4  # difference of log-likelihoods that is no rounding
 _NO_ITEM = 1e-6  # ratings of a class below which a rater has met none of it
@@ -62,16 +60,10 @@ class DawidSkene:
         Σ_i log Σ_k π_k Π θ^n, one factor a rating, without multinomial constants.
     start : {"majority", "highest"}
         Which maximum it is.
-    n_iterations : int
-        Steps of EM.
     is_converged : bool
         Whether no posterior moved any more.
-    n_starts, n_higher : int
-        Other starts that were tried, and how many of them ended higher.
     higher : DawidSkene or None
         The highest maximum that another start led to, if it is above this one.
-    seed : int or None
-        Seed that repeats the other starts.
     notes : tuple of str
         What the reader must know before relying on it.
     reason : str or None
@@ -86,13 +78,9 @@ class DawidSkene:
     accuracy: Floats = field(compare=False, repr=False)
     posterior: Floats = field(compare=False, repr=False)
     log_likelihood: float
-    start: _Start
-    n_iterations: int
+    start: Literal["majority", "highest"]
     is_converged: bool
-    n_starts: int = 0
-    n_higher: int = 0
     higher: "DawidSkene | None" = field(default=None, repr=False)
-    seed: int | None = None
     notes: tuple[str, ...] = ()
     reason: str | None = None
 
@@ -174,11 +162,7 @@ class _Fits:
 
 
 def dawid_skene(
-    ratings: object,
-    *,
-    start: _Start = "majority",
-    n_starts: int = 20,
-    rng: np.random.Generator | int | None = 0,
+    ratings: object, *, start: Literal["majority"] = "majority"
 ) -> DawidSkene:
     """Estimate classes of items and errors of raters from the ratings alone.
 
@@ -187,13 +171,9 @@ def dawid_skene(
     ratings : iterable of (item, rater, grade), or long DataFrame
         One row a rating; a rater may grade an item several times. A frame has columns
         named item, rater and grade, or as is usual. Rows without a grade are left out.
-    start : {"majority", "highest"}, optional
-        Answer with the maximum to which the shares of votes of each item lead, and say
-        whether there is a higher one; or with the highest of all starts.
-    n_starts : int, optional
-        Other starts, drawn around the shares of votes.
-    rng : Generator or int, optional
-        Where they come from; an integer is recorded as the seed.
+    start : {"majority"}, optional
+        Answer with the maximum to which the shares of votes of each item lead. Whether
+        another start ends higher is said, and `higher` has the best.
 
     Returns
     -------
@@ -233,26 +213,12 @@ def dawid_skene(
     >>> fit.accuracy.round(1).tolist()
     [1.0, 0.9, 0.5]
     """
-    check_option("start", start, get_args(_Start))
-    check_count("n_starts", n_starts, 0)
-    generator, seed = recorded_generator(rng)
+    check_option("start", start, ("majority",))
     votes = _read(ratings)
     fits = _climb(votes, votes.votes()[:, None], _MAX_STEPS, _SETTLED)
-    other, n_higher, notes = _other_starts(votes, fits, n_starts, generator)
-    answer = {"n_starts": n_starts, "seed": seed}
-    if other is None:
-        return _result(votes, fits, start=start, notes=notes, **answer)
-    higher = _result(votes, other, start="highest", **answer)
-    if start == "highest":
-        return higher
-    gain = higher.log_likelihood - float(fits.log_likelihood[0])
-    notes = (
-        f"not the highest maximum: {n_higher} of {n_starts} other starts end higher, "
-        f"the best by {gain:.3g} in log-likelihood",
-        *notes,
-    )
-    more = {"n_higher": n_higher, "higher": higher, "notes": notes}
-    return _result(votes, fits, start=start, **answer, **more)
+    other, notes = _other_starts(votes, fits, np.random.default_rng(0))
+    higher = None if other is None else _result(votes, other, start="highest")
+    return _result(votes, fits, notes=notes, higher=higher)
 
 
 def _read(ratings: object) -> _Votes:
@@ -339,9 +305,9 @@ def _posterior(
 
 
 def _other_starts(
-    votes: _Votes, fits: _Fits, n_starts: int, rng: np.random.Generator
-) -> tuple[_Fits | None, int, tuple[str, ...]]:
-    """Return the highest maximum of other starts, if it is higher, and how many are."""
+    votes: _Votes, fits: _Fits, rng: np.random.Generator
+) -> tuple[_Fits | None, tuple[str, ...]]:
+    """Return the highest maximum of other starts, if it is higher, and what to know."""
     n_patterns, max_steps, settled = _SEARCH
     part, notes = votes, tuple[str, ...]()
     chosen = np.arange(len(votes.freq))
@@ -352,15 +318,14 @@ def _other_starts(
         )
         chosen = np.sort(rng.choice(chosen, n_patterns, replace=False))
         part = replace(votes, counts=votes.counts[chosen], freq=votes.freq[chosen])
-    around = np.repeat(part.votes()[:, None] + 0.1, n_starts, axis=1)
-    drawn = rng.standard_gamma(around) + _SMALLEST
-    drawn /= drawn.sum(axis=-1, keepdims=True)
+    around = np.repeat(part.votes()[:, None] + 0.1, _N_STARTS, axis=1)
+    drawn = _dirichlet(around, -1, rng)
     first = fits.posterior[chosen]
     tried = _climb(part, np.concatenate([first, drawn], axis=1), max_steps, settled)
     gains = tried.log_likelihood - tried.log_likelihood[0]
     best, n_higher = int(gains.argmax()), int((gains > _HIGHER).sum())
     if not n_higher:
-        return None, 0, notes
+        return None, notes
     posterior, _ = _posterior(
         votes, tried.shares[[best]], _confusion(tried.expected[:, :, [best]])
     )
@@ -368,19 +333,31 @@ def _other_starts(
     overlap = (votes.freq[:, None] * fits.posterior[:, 0]).T @ posterior[:, 0]
     order = linear_sum_assignment(-overlap)[1]
     other = _climb(votes, posterior[:, :, order], _MAX_STEPS, _SETTLED)
-    if other.log_likelihood[0] - fits.log_likelihood[0] <= _HIGHER:
-        return None, 0, notes
-    return other, n_higher, notes
+    gain = float(other.log_likelihood[0] - fits.log_likelihood[0])
+    if gain <= _HIGHER:
+        return None, notes
+    note = (
+        f"not the highest maximum: {n_higher} of {_N_STARTS} other starts end higher, "
+        f"the best by {gain:.3g} in log-likelihood"
+    )
+    return other, (note, *notes)
 
 
-def _result(votes: _Votes, fits: _Fits, *, start: _Start, **more: Any) -> DawidSkene:
+def _result(
+    votes: _Votes,
+    fits: _Fits,
+    *,
+    start: Literal["majority", "highest"] = "majority",
+    notes: tuple[str, ...] = (),
+    higher: DawidSkene | None = None,
+) -> DawidSkene:
     """Return the first of the fits, with what it does not tell."""
     expected = fits.expected[:, :, 0].transpose(0, 2, 1)  # (n_raters, classes, grades)
     has_none = expected.sum(axis=2) < _NO_ITEM
     confusion = _confusion(fits.expected)[:, :, 0].transpose(0, 2, 1)
     confusion[has_none] = math.nan
     shares, posterior = fits.shares[0], fits.posterior[votes.pattern, 0]
-    notes = (*more.pop("notes", ()), *_doubts(votes, posterior, has_none))
+    notes += _doubts(votes, posterior, has_none)
     if fits.move > _SETTLED:
         notes = (f"EM had not settled after {fits.n_steps} steps", *notes)
     correct = np.diagonal(confusion, axis1=1, axis2=2)
@@ -400,28 +377,27 @@ def _result(votes: _Votes, fits: _Fits, *, start: _Start, **more: Any) -> DawidS
         posterior=_read_only(posterior),
         log_likelihood=float(fits.log_likelihood[0]),
         start=start,
-        n_iterations=fits.n_steps,
         is_converged=fits.move <= _SETTLED,
+        higher=higher,
         notes=notes if reason is None else (reason, *notes),
         reason=reason,
-        **more,
     )
 
 
-def _doubts(votes: _Votes, posterior: Floats, has_none: Any) -> list[str]:
+def _doubts(votes: _Votes, posterior: Floats, has_none: Any) -> tuple[str, ...]:
     """Return which classes no item has, and of which a rater has graded none."""
-    best = np.bincount(posterior.argmax(axis=1), minlength=len(votes.categories))
-    doubts = [
-        f"no item is most probably of class {votes.categories[k]!r}"
-        for k in np.flatnonzero(best == 0)
-    ]
-    pairs = [
-        f"{votes.raters[j]!r} of class {votes.categories[k]!r}"
-        for j, k in np.argwhere(has_none)
-    ]
-    if pairs:
-        doubts.append(f"errors unknown, no item graded: {listed(pairs)}")
-    return doubts
+    best, names = posterior.argmax(axis=1), votes.categories
+    pairs = listed(
+        f"{votes.raters[j]!r} of class {names[k]!r}" for j, k in np.argwhere(has_none)
+    )
+    return (
+        *(
+            f"no item is most probably of class {name!r}"
+            for k, name in enumerate(names)
+            if k not in best
+        ),
+        *([f"errors unknown, no item graded: {pairs}"] if pairs else []),
+    )
 
 
 def _read_only(values: Floats) -> Floats:
@@ -512,12 +488,13 @@ def dawid_skene_intervals(
     fit = _result(votes, fits, start="majority")
     drawn = _draw(votes, fits, -(-n_resamples // _N_CHAINS), generator)
     n_draws, n_switched = len(drawn[0]), _count_switches(fit.confusion, drawn[1])
-    blank, notes = 0.0, fit.notes
-    if fit.reason is not None:
+    blank = 0.0
+    cautions: tuple[str, ...] = ()
+    if fit.reason is None:
+        cautions = _cautions(fit, n_switched, n_draws)
+    else:
         undefined("an interval of the Dawid-Skene model", fit.reason)
         blank = math.nan
-    else:
-        notes += _cautions(fit, n_switched, n_draws)
     shares, confusion = (
         _ends(estimate + blank, of, level)
         for estimate, of in zip((fit.shares, fit.confusion), drawn, strict=True)
@@ -533,28 +510,25 @@ def dawid_skene_intervals(
         n_resamples=n_draws,
         n_switched=n_switched,
         seed=seed,
-        notes=notes,
+        notes=fit.notes + cautions,
         reason=fit.reason,
     )
 
 
 def _cautions(fit: DawidSkene, n_switched: int, n_draws: int) -> tuple[str, ...]:
     """Warn where raters tell classes apart so little that intervals may be short."""
-    cautions = []
     certainty = float(fit.posterior.max(axis=1).mean())
-    if certainty < _CERTAIN:
-        cautions.append(
-            f"the class of an item has a probability of {certainty:.2f} on average: "
-            f"below {_CERTAIN} the interval may cover less than it says"
-        )
-    if n_switched > _MANY_SWITCHED * n_draws:
-        cautions.append(
-            f"classes exchanged places in {n_switched} of {n_draws} draws: raters "
-            "hardly tell them apart"
-        )
+    said = {
+        f"the class of an item has a probability of {certainty:.2f} on average: "
+        f"below {_CERTAIN} the interval may cover less than it says": certainty
+        < _CERTAIN,
+        f"classes exchanged places in {n_switched} of {n_draws} draws: raters "
+        "hardly tell them apart": n_switched > _MANY_SWITCHED * n_draws,
+    }
+    cautions = tuple(text for text, is_so in said.items() if is_so)
     for caution in cautions:
         warn_caller(caution, SmallSampleWarning)
-    return tuple(cautions)
+    return cautions
 
 
 def _draw(
@@ -563,13 +537,12 @@ def _draw(
     """Draw π (n_draws, n_classes) and θ (n_draws, n_raters, n_classes, n_grades)."""
     posterior = np.repeat(fits.posterior, _N_CHAINS, axis=1)
     freq = votes.freq.astype(np.int64)[:, None]
-    right = np.eye(len(votes.categories))[:, None]  # (n_grades, 1, n_classes)
+    prior = _PRIOR + _PRIOR_RIGHT * np.eye(len(votes.categories))[:, None]  # of θ
     drawn = []
     for step in range(_BURN_IN + n_draws):
         # items of each pattern and class, (n_patterns, n_chains, n_classes)
         items = rng.multinomial(freq, posterior).astype(np.float64)
         shares = _dirichlet(items.sum(axis=0) + 1.0, -1, rng)
-        prior = _PRIOR + _PRIOR_RIGHT * right
         confusion = _dirichlet(_expected(votes, items) + prior, 1, rng)
         posterior, _ = _posterior(votes, shares, confusion)
         if step >= _BURN_IN:
@@ -702,29 +675,35 @@ def effective_number(errors: object, *, level: float = 0.95) -> EffectiveNumber:
     a, b = patterns[pairs]
     parts = np.stack([np.ones_like(a), a, b, a * b])
     sums = (parts @ freq.astype(np.float64))[..., None]
-    correlations, without = _correlations(sums)[:, 0], _correlations(sums - parts)
-    is_defined = ~np.isnan(correlations)
-    rho = float(correlations[is_defined].mean()) if is_defined.any() else math.nan
-    value, reason, error = k / _design_effect(k, rho), None, math.nan
+    every = _correlations(np.concatenate([sums, sums - parts], axis=-1))
+    is_defined = ~np.isnan(every[:, 0])
+    # without an item a pair may have no correlation: the mean is of the others
+    there = every[is_defined]
+    means = divide(np.nansum(there, axis=0), (~np.isnan(there)).sum(axis=0))
+    rho = float(means[0])
+    # 1 + (k - 1) ρ, which a mean over some pairs can bring below 0
+    effects = 1.0 + (k - 1) * np.where(np.isnan(means), rho, means)
+    effects = np.maximum(effects, _SMALLEST)
+    error = math.sqrt(_variance_of(np.log(effects[1:]), n_items, freq))
+    reason = None
     if math.isnan(rho):
-        reason = "0/0: of every two judges, one makes no error or only errors"
-        undefined("the effective number of judges", reason)
-    else:
-        # without an item a pair may have no correlation: the mean is of the others
-        moved = np.nan_to_num(without[is_defined]).sum(axis=0)
-        moved = divide(moved, (~np.isnan(without[is_defined])).sum(axis=0), rho)
-        effects = [_design_effect(k, float(mean)) for mean in moved]
-        error = math.sqrt(_variance_of(np.log(effects), n_items, freq))
-    if error == 0.0:
-        error, reason = math.nan, "leaving out any of the items changes nothing"
-        undefined("the interval of the effective number of judges", reason)
+        reason = undefined(
+            "the effective number of judges",
+            "0/0: of every two judges, one makes no error or only errors",
+        )
+    elif error == 0.0:
+        reason = undefined(
+            "the interval of the effective number of judges",
+            "leaving out any of the items changes nothing",
+        )
+    value = k / float(effects[0])
     factor = math.exp(student_t(level, n_items - 1) * error)
     wrong = table.sum(axis=1).astype(np.int64)
     fewest = int(np.minimum(wrong, n_items - wrong).min())
     return EffectiveNumber(
         value=value,
         low=max(value / factor, 1.0) if reason is None else math.nan,
-        high=value * factor,
+        high=value * factor if reason is None else math.nan,
         mean_correlation=rho,
         n_judges=k,
         n_items=n_items,
@@ -734,11 +713,6 @@ def effective_number(errors: object, *, level: float = 0.95) -> EffectiveNumber:
         notes=warn_small(fewest, 10, "errors, or right grades, of a judge"),
         reason=reason,
     )
-
-
-def _design_effect(k: int, rho: float) -> float:
-    """Return 1 + (k - 1) ρ, which a mean over some pairs can bring below 0."""
-    return max(1.0 + (k - 1) * rho, _SMALLEST)
 
 
 def _correlations(sums: Floats) -> Floats:

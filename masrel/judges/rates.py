@@ -7,21 +7,19 @@ mean, with an interval for other items like these.
 import math
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+from scipy.special import stdtrit
 
 from masrel._input import check_option, listed, refuse, shown
-from masrel.agreement._engine import check_level, divide, undefined
+from masrel.agreement._engine import Floats, check_level, divide, undefined
 from masrel.agreement._labels import is_missing
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.judges._paired import check_count, check_share
+from masrel.judges.annotators import Grades, by_item
 
-if TYPE_CHECKING:
-    from masrel.judges.annotators import Grades
-
-_Floats = NDArray[np.float64]
 _Number = Any  # a float, or an array of them
 _MeanMethod = Literal["auto", "z"]
 _RateMethod = Literal["naive", "rogan_gladen", "prediction_powered", "labels_alone"]
@@ -190,12 +188,15 @@ def corrected_rate(
     check_share("rate", rate)
     check_count("n", n)
     for name, pair in (("sensitivity", sensitivity), ("specificity", specificity)):
-        if not isinstance(pair, tuple | list) or len(pair) != 2:
-            needed = f"{name}: needs a share and the number of items that it is of"
-            raise ParameterError(f"{needed}, got {shown(pair)}")
+        is_pair = isinstance(pair, tuple | list) and len(pair) == 2
+        needed = "needs a share and the number of items that it is of"
+        refuse((not is_pair, f"{name}: {needed}, got {shown(pair)}"))
         check_share(name, pair[0])
         check_count(name, pair[1])
-    refuse(_by_chance(sensitivity[0], specificity[0]))
+    total = sensitivity[0] + specificity[0]
+    needed = "sensitivity, specificity: need a sum above 1"
+    why = "such a judge tells nothing of the rate"
+    refuse((total <= 1.0, f"{needed}, got {total:.4g}: {why}"))
     return _corrected(rate, n, sensitivity, specificity, level)
 
 
@@ -276,8 +277,7 @@ def prediction_powered_mean(
     """
     check_level(level)
     check_option("method", method, get_args(_MeanMethod))
-    if power is not None:
-        check_share("power", power)
+    check_share("power", 0.0 if power is None else power)
     y, f = _numbers("labels", labels), _numbers("predictions", predictions)
     pool = _numbers("unlabelled", unlabelled)
     n, m = len(y), len(pool)
@@ -312,8 +312,10 @@ def prediction_powered_mean(
     )
     reason = None
     if np.isnan(low):
-        title = "the interval of the prediction-powered mean"
-        reason = undefined(title, "all labelled items have the same error")
+        reason = undefined(
+            "the interval of the prediction-powered mean",
+            "all labelled items have the same error",
+        )
     return RateEstimate(
         method="prediction_powered",
         value=float(value + shift),
@@ -331,8 +333,8 @@ def prediction_powered_mean(
 
 
 def rate_estimates(
-    labels: "Grades",
-    judge: "Grades",
+    labels: Grades,
+    judge: Grades,
     *,
     grade: Hashable,
     level: float = 0.95,
@@ -388,7 +390,10 @@ def rate_estimates(
     labels_alone: 0.500 (0.363 to 0.637)
     """
     check_level(level)
-    human, model = _graded("labels", labels), _graded("judge", judge)
+    human, model = (
+        {item: of for item, of in by_item(grades, name).items() if not is_missing(of)}
+        for name, grades in (("labels", labels), ("judge", judge))
+    )
     both = [item for item in human if item in model]
     n, m, n_judged = len(both), len(model) - len(both), len(model)
     refuse(
@@ -425,53 +430,6 @@ def rate_estimates(
     )
 
 
-def label_allocation(
-    m: int, rate: float, *, sensitivity: float, specificity: float, pilot: int
-) -> float:
-    """Return how many of the items to label are best positives.
-
-    Parameters
-    ----------
-    m : int
-        Items to label in all.
-    rate : float
-        The rate that is expected, in (0, 1).
-    sensitivity, specificity : float
-        The judge's shares in a pilot, each in [0, 1].
-    pilot : int
-        Labelled items of each kind in the pilot.
-
-    Returns
-    -------
-    float
-        Positives with which the corrected rate is most precise; the rest of the m items
-        are negatives.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    References
-    ----------
-    .. [1] Lee, C., et al. (2025). How to correctly report LLM-as-a-judge evaluations.
-       https://arxiv.org/abs/2511.21140
-
-    Examples
-    --------
-    >>> round(label_allocation(200, 0.4, sensitivity=0.9, specificity=0.7, pilot=20))
-    61
-    """
-    check_count("m", m)
-    check_count("pilot", pilot)
-    check_share("sensitivity", sensitivity)
-    check_share("specificity", specificity)
-    check_level(rate, "rate")
-    # κ of [1]: how much more the specificity varies than the sensitivity
-    kappa = (pilot * (1.0 - specificity) + 1.0) / (pilot * (1.0 - sensitivity) + 1.0)
-    return m / (1.0 + (1.0 / rate - 1.0) * math.sqrt(kappa))
-
-
 def labels_needed(
     half_width: float,
     *,
@@ -479,7 +437,6 @@ def labels_needed(
     sensitivity: float,
     specificity: float,
     n_items: int,
-    method: _RateMethod = "prediction_powered",
     level: float = 0.95,
 ) -> int:
     """Return how many of the judged items need a label for a precise rate.
@@ -494,15 +451,13 @@ def labels_needed(
         What is expected of the judge, each in [0, 1].
     n_items : int
         Items that the judge grades; the labelled ones are a random sample of them.
-    method : {"prediction_powered", "rogan_gladen", "labels_alone"}, optional
-        The estimate of the rate.
     level : float, optional
         Level of the interval.
 
     Returns
     -------
     int
-        The least number of labels.
+        The least number of labels of the prediction-powered rate.
 
     Raises
     ------
@@ -521,23 +476,14 @@ def labels_needed(
     """
     check_level(level)
     check_level(half_width, "half_width")
-    check_option("method", method, tuple(_ASSUMPTIONS)[1:])
     check_share("rate", rate)
     check_share("sensitivity", sensitivity)
     check_share("specificity", specificity)
     check_count("n_items", n_items, 2)
     n = np.arange(2.0, n_items + 1.0)
     passed = rate * sensitivity + (1.0 - rate) * (1.0 - specificity)
-    if method == "rogan_gladen":
-        refuse(_by_chance(sensitivity, specificity))
-        of_kinds = (sensitivity, rate * n), (specificity, (1.0 - rate) * n)
-        low, high = _lang_reiczigel(passed, n_items, *of_kinds, _quantile(level))
-    else:
-        power = 0.0 if method == "labels_alone" else None
-        expected = _share_moments(
-            n, n_items - n, rate, passed, rate * sensitivity, passed
-        )
-        low, high = expected.padded_ends(power, level)
+    expected = _share_moments(n, n_items - n, rate, passed, rate * sensitivity, passed)
+    low, high = expected.padded_ends(None, level)
     widths = (np.clip(high, 0.0, 1.0) - np.clip(low, 0.0, 1.0)) / 2.0
     needed = f"{widths[-1]:.4g} or more, which labels of all {n_items} items give"
     refuse((widths[-1] > half_width, f"half_width: needs {needed}, got {half_width}"))
@@ -592,15 +538,15 @@ class _Moments:
         """Return the ends of shares to which z² labels are added."""
         z = _quantile(level)
         of_labels = self.n / (self.n + z**2)
-        half, quarter = (1.0 - of_labels) / 2.0, (1.0 - of_labels) / 4.0
+        half = (1.0 - of_labels) / 2.0
         y, f = of_labels * self.y + half, of_labels * self.f + half
-        both = of_labels * self.yf + quarter
+        both = of_labels * self.yf + half / 2.0
         padded = _share_moments(self.n + z**2, self.m, y, f, both, self.pool)
         _, used = padded.mean(power)
         return padded.ends(used, _quantile(level, self.n - 1.0))
 
     def jackknife_ends(
-        self, y: _Floats, f: _Floats, power: _Number | None, level: float
+        self, y: Floats, f: Floats, power: _Number | None, level: float
     ) -> tuple[_Number, _Number]:
         """Return the ends, each labelled item left out once; ``nan`` without spread."""
         rest = self.n - 1.0
@@ -665,24 +611,20 @@ def _corrected(
 ) -> RateEstimate:
     """Return the corrected rate, or why it is undefined."""
     (q1, m1), (q0, m0) = sensitivity, specificity
-    numbers: tuple[_Number, ...] = (math.nan,) * 3
+    value = divide(np.array(rate + q0 - 1.0), np.array(q0 + q1 - 1.0))
+    ends = _lang_reiczigel(rate, n, sensitivity, specificity, _quantile(level))
     reason = None
     if not (m1 and m0):
         reason = "the labelled items are all of one kind"
-    elif _by_chance(q1, q0)[0]:
+    elif q1 + q0 <= 1.0:
         reason = "the judge does no better than chance in the labelled items"
-    else:
-        value = (rate + q0 - 1.0) / (q0 + q1 - 1.0)
-        ends = _lang_reiczigel(rate, n, sensitivity, specificity, _quantile(level))
-        numbers = value, *ends
-    n_labels, n_of_a_kind = m1 + m0, min(m1, m0)
+    are_enough = m1 + m0 >= _ENOUGH["of_both_kinds"]
     return _estimate(
         "rogan_gladen",
-        numbers,
+        (value, *ends) if reason is None else (math.nan,) * 3,
         level,
-        (n, n_labels),
-        is_few=n_labels < _ENOUGH["of_both_kinds"]
-        or n_of_a_kind < _ENOUGH["of_a_kind"],
+        (n, m1 + m0),
+        is_few=not are_enough or min(m1, m0) < _ENOUGH["of_a_kind"],
         reason=reason,
     )
 
@@ -747,24 +689,13 @@ def _estimate(
 
 def _quantile(level: float, df: _Number = math.inf) -> _Number:
     """Return the quantile of Student's t, or the normal one, for both ends."""
-    from scipy.special import stdtrit  # loaded only for an interval
-
     return stdtrit(df, 0.5 + 0.5 * level)
 
 
 # -- checks --------------------------------------------------------------------------
 
 
-def _by_chance(sensitivity: float, specificity: float) -> tuple[bool, str]:
-    """Return whether a judge does no better than chance, and what is said of it."""
-    total = sensitivity + specificity
-    return total <= 1.0, (
-        f"sensitivity, specificity: need a sum above 1, got {total:.4g}: such a judge "
-        "tells nothing of the rate"
-    )
-
-
-def _numbers(name: str, values: ArrayLike) -> _Floats:
+def _numbers(name: str, values: ArrayLike) -> Floats:
     """Return a sequence of numbers as an array."""
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -773,10 +704,3 @@ def _numbers(name: str, values: ArrayLike) -> _Floats:
     if array.ndim != 1 or not np.isfinite(array).all():
         raise RatingsError(f"{name}: needs a sequence of numbers, got {shown(values)}")
     return array
-
-
-def _graded(name: str, grades: "Grades") -> dict[Any, Any]:
-    """Return grades by item, without the missing ones."""
-    if not hasattr(grades, "items"):
-        raise RatingsError(f"{name}: needs item to grade, got {shown(grades)}")
-    return {item: of for item, of in grades.items() if not is_missing(of)}
