@@ -394,7 +394,7 @@ class _Graded:
         # -> (n_items,)
         if clusters is None:
             return np.arange(len(self.items))
-        of = by_item(clusters, "clusters")
+        of = _by_item(clusters, "clusters")
         codes, _ = label_codes([list(map(of.get, self.items))], None)
         if (codes < 0).any():
             item = self.items[int(codes[0].argmin())]
@@ -411,7 +411,7 @@ def _graded(
     """Check grades; code those of items with two humans' and all judges' grades."""
     check_count("min_items", min_items)
     title, declared, weights = _checked_score(score)
-    of_humans = {str(name): of for name, of in by_item(humans, "humans").items()}
+    of_humans = {str(name): of for name, of in _by_item(humans, "humans").items()}
     n, graders = len(of_humans), {f"humans: {who}": of for who, of in of_humans.items()}
     items, codes, categories = _coded({**graders, **judges}, list(judges), declared)
     is_there = codes >= 0
@@ -451,7 +451,7 @@ def _coded(
 ) -> tuple[list[Hashable], Integers, tuple[Label, ...]]:
     """Return the items of those who are needed, codes of all, and the categories."""
     # graders: by their places for messages -> codes (n_items, n_graders)
-    grades = {place: by_item(of, place) for place, of in graders.items()}
+    grades = {place: _by_item(of, place) for place, of in graders.items()}
     items = [x for x in grades[needed[0]] if all(x in grades[of] for of in needed)]
     codes, categories = label_codes(
         [list(map(of.get, items)) or [None] for of in grades.values()],
@@ -461,7 +461,7 @@ def _coded(
     return items, np.ascontiguousarray(codes.T), categories
 
 
-def by_item(grades: Any, place: str) -> dict[Any, Any]:
+def _by_item(grades: Any, place: str) -> dict[Any, Any]:
     """Return what there is by item, once each."""
     if not hasattr(grades, "items"):
         raise RatingsError(
@@ -735,7 +735,7 @@ def advantage_differences(
     >>> round(pair.value, 3), round(pair.interval.low, 3)
     (0.067, 0.002)
     """
-    by_name = {str(name): grades for name, grades in by_item(judges, "judges").items()}
+    by_name = {str(name): grades for name, grades in _by_item(judges, "judges").items()}
     if len(by_name) < 2:
         raise ParameterError(f"judges: needs at least two, got {len(by_name)}")
     rest = _leave_out(humans, by_name, target, score, min_items, level, clusters)

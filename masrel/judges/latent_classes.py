@@ -518,14 +518,14 @@ def dawid_skene_intervals(
 def _cautions(fit: DawidSkene, n_switched: int, n_draws: int) -> tuple[str, ...]:
     """Warn where raters tell classes apart so little that intervals may be short."""
     certainty = float(fit.posterior.max(axis=1).mean())
-    said = {
+    doubts = {
         f"the class of an item has a probability of {certainty:.2f} on average: "
         f"below {_CERTAIN} the interval may cover less than it says": certainty
         < _CERTAIN,
         f"classes exchanged places in {n_switched} of {n_draws} draws: raters "
         "hardly tell them apart": n_switched > _MANY_SWITCHED * n_draws,
     }
-    cautions = tuple(text for text, is_so in said.items() if is_so)
+    cautions = tuple(text for text, is_so in doubts.items() if is_so)
     for caution in cautions:
         warn_caller(caution, SmallSampleWarning)
     return cautions

@@ -18,7 +18,7 @@ from masrel.agreement._engine import Floats, check_level, divide, undefined
 from masrel.agreement._labels import is_missing
 from masrel.errors import RatingsError
 from masrel.judges._paired import check_count, check_share
-from masrel.judges.annotators import Grades, by_item
+from masrel.judges.annotators import Grades, _by_item
 
 _Number = Any  # a float, or an array of them
 _MeanMethod = Literal["auto", "z"]
@@ -391,7 +391,7 @@ def rate_estimates(
     """
     check_level(level)
     human, model = (
-        {item: of for item, of in by_item(grades, name).items() if not is_missing(of)}
+        {item: of for item, of in _by_item(grades, name).items() if not is_missing(of)}
         for name, grades in (("labels", labels), ("judge", judge))
     )
     both = [item for item in human if item in model]
