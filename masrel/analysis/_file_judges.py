@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
+from itertools import compress, product
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,8 @@ from masrel.analysis._file_estimates import (
     placed,
 )
 from masrel.analysis._file_preferences import preference_answers
-from masrel.analysis._gates import Gate, GateResult, read_gate
+from masrel.analysis._gates import read_gate
 from masrel.analysis._judging import Judging
-from masrel.errors import ParameterError
 from masrel.estimates import _population, as_document
 from masrel.judges import (
     advantage,
@@ -60,7 +60,6 @@ class _Part:
     file: RatingsFile
     questions: Questions
     judging: Judging
-    margin: float
     judges: tuple[str, ...]
     humans: tuple[str, ...]
     texts: Mapping[str, _Grades]  # grades as they are called
@@ -73,50 +72,42 @@ _Made = Iterator[tuple[str, Row, Row]]  # name of an answer, a row, and cells be
 
 def judging_answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     """Return what is told of the judges of every part of the ratings."""
-    judging = questions.judging
-    if judging is None:
-        raise ParameterError("judging: needed judges")
-    if judging.order is not None:
-        answered = list(preference_answers(file, questions))
-        yield from _with_gates(answered, judging.require)
-        return
+    judging = questions.judging or Judging()
+    ask = _answers if judging.order is None else preference_answers
+    yield from _with_gates([*ask(file, questions)], judging.require)
+
+
+def _answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    judging = questions.judging or Judging()
     is_asked = {
         _beside_humans: judging.margin is not None,
         _differences: judging.margin is not None,
         _rates: judging.rate is not None,
         _truth: judging.truth,
     }
-    makers = [make for make, is_so in is_asked.items() if is_so]
-    refuse((not makers, _MARGIN))
+    refuse((not any(is_asked.values()), _MARGIN))
     rows: dict[str, list[tuple[Row, Row]]] = {}
     who: dict[str, None] = {}
     for part, group, keys in _parts(file, questions, judging):
-        roles = {
-            "judges": listed(part.judges) or "none",
-            "humans": listed(part.humans) or "none",
-        }
-        who[note("roles", **roles)] = None
-        for make in makers:
+        roles = {"judges": listed(part.judges), "humans": listed(part.humans)}
+        who[note("roles", **{role: of or "none" for role, of in roles.items()})] = None
+        for make in compress(is_asked, is_asked.values()):
             with placed(file.read["file"], group):
                 for name, row, cells in make(part):
                     both = {**keys, **row}, {**keys, **row, "group": group, **cells}
                     rows.setdefault(name, []).append(both)
-    answered = [
-        Answer(
+    for name, several in rows.items():
+        of_json, shown = map(list, zip(*several, strict=True))
+        yield Answer(
             name=name,
-            rows=[row for row, _ in several],
-            shown=[cells for _, cells in several],
+            rows=of_json,
+            shown=shown,
             heads=heads_of(*part_names(file, file.parts[0])),
-            notes=(
-                *(who if at == 0 else ()),
-                *_notes(name, [row for row, _ in several], questions),
-            ),
+            notes=(*who, *_notes(name, of_json, questions)),
             of=judging.rate or "",
             grades=file.scale.grades if name == "truth_confusion" else (),
         )
-        for at, (name, several) in enumerate(rows.items())
-    ]
-    yield from _with_gates(answered, judging.require)
+        who = {}  # below the first
 
 
 def _parts(
@@ -140,19 +131,17 @@ def _parts(
             }
             for labels in (texts, values)
         )
-        clusters = (
-            dict(zip(items, part.clusters, strict=True)) if part.clusters else None
-        )
         made = _Part(
             file=file,
             questions=questions,
             judging=judging,
-            margin=judging.margin or 0.0,
             judges=judges,
             humans=humans,
             texts=of_texts,
             values=of_values,
-            clusters=clusters,
+            clusters=dict(zip(items, part.clusters, strict=True))
+            if part.clusters
+            else None,
         )
         yield made, group, keys
 
@@ -179,11 +168,17 @@ def _roles(
             refuse((name not in raters, f"{option}: {known}"))
     several = [name for names in named.values() for name in names]
     twice = [name for name in dict.fromkeys(several) if several.count(name) > 1]
-    options = ", ".join(named)
-    refuse((twice, f"{options}: needed others each, got {listed(twice)} twice"))
     judges, humans, _ = named.values()
-    is_needed = not (judges or judging.truth)
-    refuse((is_needed, "--judge: needed the rater who is the judge"))
+    refuse(
+        (
+            twice,
+            f"{', '.join(named)}: needed others each, got {listed(twice)} twice",
+        ),
+        (
+            not (judges or judging.truth),
+            "--judge: needed the rater who is the judge",
+        ),
+    )
     if humans:
         return judges, humans
     several += [name for name, kind in kinds.items() if kind != "human"]
@@ -227,7 +222,7 @@ def _beside_humans(part: _Part) -> _Made:
         result = alternative_annotator_test(
             {name: part.values[name] for name in part.humans},
             part.values[judge],
-            epsilon=part.margin,
+            epsilon=judging.margin or 0.0,
             test=judging.test,
             level=1.0 - level,
             **how,
@@ -253,9 +248,11 @@ def _beside_humans(part: _Part) -> _Made:
             if part.clusters is None:  # else it would be too short
                 ends = score_test(human.b, human.c, human.n_items, level=level)
                 row |= {"difference_low": ends.low, "difference_high": ends.high}
-            not_worse = _YES[human.is_rejected]
-            title = f"{human.name}, {judge}"
-            yield "humans", row, {"title": title, "not_worse": not_worse}
+            cells = {
+                "title": f"{human.name}, {judge}",
+                "not_worse": _YES[human.is_rejected],
+            }
+            yield "humans", row, cells
 
 
 def _how(part: _Part) -> dict[str, Any]:
@@ -275,29 +272,25 @@ def _with_interval(
     part: _Part, judge: str, row: Row, texts: list[str]
 ) -> tuple[Row, Row]:
     """Return a judge's row with the interval of the advantage, and cells beside it."""
-    passes = _YES[row["is_passed"]]
-    cells: Row = {"title": judge, "texts": texts, "passes": passes}
+    cells: Row = {"title": judge, "texts": texts, "passes": _YES[row["is_passed"]]}
     target = part.questions.target
     if target is None:
         return {**row, "standard_error": None, "interval": None}, cells
-    humans = {name: part.values[name] for name in part.humans}
     estimate = advantage(
-        humans,
+        {name: part.values[name] for name in part.humans},
         part.values[judge],
         target=target,
         level=part.questions.level,
         **_how(part),
     )
     interval: Any = estimate.interval
-    row = {
-        **row,
+    row |= {
         "standard_error": estimate.standard_error,
         "interval": as_document(interval),
     }
     why = [] if interval.reason is None else [f"no interval: {interval.reason}"]
-    ends = {key: getattr(interval, key) for key in ("low", "high", "level")}
     cells |= {
-        **ends,
+        **{key: getattr(interval, key) for key in ("low", "high", "level")},
         "population": _population(interval),
         "interval_texts": [*why, *interval.notes],
     }
@@ -317,18 +310,21 @@ def _differences(part: _Part) -> _Made:
         humans, judges, target=questions.target, level=questions.level, **_how(part)
     ):
         row = {of.name: getattr(pair, of.name) for of in fields(pair)}
-        ends = {"low": pair.interval.low, "high": pair.interval.high}
-        group = {"group": f"{pair.first} and {pair.second}"}
-        yield "judge_differences", row, {**ends, **group}
+        cells = {
+            "low": pair.interval.low,
+            "high": pair.interval.high,
+            "group": f"{pair.first} and {pair.second}",
+        }
+        yield "judge_differences", row, cells
 
 
 def _against_reference(part: _Part, reference: str) -> _Made:
     """Give how much more often than the one human each judge is right."""
-    (human,) = part.humans
+    (human,), epsilon = part.humans, part.judging.margin or 0.0
     for judge in part.judges:
         test = reference_difference(
             *(part.texts[name] for name in (human, judge, reference)),
-            epsilon=part.margin,
+            epsilon=epsilon,
             level=part.questions.level,
         )
         row: Row = {
@@ -342,7 +338,7 @@ def _against_reference(part: _Part, reference: str) -> _Made:
             "low": test.low,
             "high": test.high,
             "level": test.level,
-            "epsilon": part.margin,
+            "epsilon": epsilon,
             "p_value": test.p_greater,
             "is_passed": test.p_greater <= 1.0 - test.level,
             "reason": test.reason,
@@ -425,8 +421,7 @@ def _rates(part: _Part) -> _Made:
 
 def _truth(part: _Part) -> _Made:
     """Give shares of classes, errors of raters, and what they are worth together."""
-    questions, grades = part.questions, part.file.scale.grades
-    raters = (*part.judges, *part.humans)
+    questions, raters = part.questions, (*part.judges, *part.humans)
     result = dawid_skene_intervals(
         [
             (item, rater, grade)
@@ -439,12 +434,9 @@ def _truth(part: _Part) -> _Made:
     )
     fit = result.fit
     chosen = fit.posterior.argmax(axis=1)
-    texts = [text.rstrip(".") for text in dict.fromkeys((*fit.notes, *result.notes))]
     for k, category in enumerate(fit.categories):
-        of_class = zip(
-            fit.items, fit.posterior[:, k].tolist(), chosen == k, strict=True
-        )
-        of_truth: Row = {
+        of_class = zip(fit.items, fit.posterior.tolist(), chosen == k, strict=True)
+        row: Row = {
             "class": category,
             "share": float(fit.shares[k]),
             "low": float(result.shares_low[k]),
@@ -452,31 +444,30 @@ def _truth(part: _Part) -> _Made:
             "level": result.level,
             "log_likelihood": fit.log_likelihood,
             "start": fit.start,
-            "items": {str(item): p for item, p, is_chosen in of_class if is_chosen},
+            "items": {str(item): p[k] for item, p, is_chosen in of_class if is_chosen},
             "reason": result.reason,
         }
-        is_most = bool(k == fit.shares.argmax())
-        yield (
-            "truth",
-            of_truth,
-            {"title": category, "texts": texts, "is_default": is_most},
-        )
-    for r, rater in enumerate(fit.raters):
-        for k, category in enumerate(fit.categories):
-            shares = dict(
-                zip(fit.categories, fit.confusion[r, k].tolist(), strict=True)
-            )
-            row: Row = {
-                "rater": str(rater),
-                "class": category,
-                "right": float(fit.confusion[r, k, k]),
-                "right_low": float(result.confusion_low[r, k, k]),
-                "right_high": float(result.confusion_high[r, k, k]),
-                "shares": shares,
-            }
-            cells = {f"said_{grade}": shares.get(grade, 0.0) for grade in grades}
-            n = len(fit.items) * float(fit.shares[k])
-            yield "truth_confusion", row, {**cells, "n": n}
+        cells: Row = {
+            "title": category,
+            "texts": [text.rstrip(".") for text in dict.fromkeys(result.notes)],
+            "is_default": bool(k == fit.shares.argmax()),
+        }
+        yield "truth", row, cells
+    for (r, rater), (k, category) in product(
+        enumerate(fit.raters), enumerate(fit.categories)
+    ):
+        shares = dict(zip(fit.categories, fit.confusion[r, k].tolist(), strict=True))
+        row = {
+            "rater": str(rater),
+            "class": category,
+            "right": float(fit.confusion[r, k, k]),
+            "right_low": float(result.confusion_low[r, k, k]),
+            "right_high": float(result.confusion_high[r, k, k]),
+            "shares": shares,
+        }
+        cells = {f"said_{of}": shares.get(of, 0.0) for of in part.file.scale.grades}
+        cells["n"] = len(fit.items) * float(fit.shares[k])
+        yield "truth_confusion", row, cells
     yield from _effective_number(part, raters if len(part.judges) < 2 else part.judges)
 
 
@@ -514,28 +505,29 @@ _TESTS = {
 }
 
 
-def _notes(name: str, rows: Sequence[Row], questions: Questions) -> Iterator[str]:
+_BELOW = {
+    "judges": ("advantage",),
+    "humans": ("closer", "worse"),
+    "judge_reference": ("right",),
+    "judge_differences": ("judge_difference",),
+    "truth_confusion": ("classes",),
+    "effective_number": ("worth",),
+    "rates": ("labels",),
+}
+
+
+def _notes(name: str, rows: Sequence[Row], questions: Questions) -> list[str]:
     """Return what stands below the table of an answer."""
-    level = questions.level
-    if name == "judges":
-        yield note("advantage")
-        if questions.target is None:
-            yield note("no_ends")
-    elif name == "humans":
-        tests = ", ".join(dict.fromkeys(_TESTS[row["test"]] for row in rows))
-        yield note("closer")
-        yield note("worse", tests=tests, level=1.0 - level)
-    elif name == "judge_reference":
-        of = {key: rows[0][key] for key in ("reference", "epsilon")}
-        yield note("right", **of, level=level)
-    elif name == "judge_differences":
-        yield note("judge_difference", level=level)
-    elif name == "truth_confusion":
-        yield note("classes", level=level)
-    elif name == "effective_number":
-        yield note("worth", level=level)
-    elif name == "rates":
-        yield note("labels", labels=rows[0]["labels"], level=level)
+    level, is_of_humans = questions.level, name == "humans"
+    tests = dict.fromkeys(_TESTS[row["test"]] for row in rows if is_of_humans)
+    values = {
+        **rows[0],
+        "tests": ", ".join(tests),
+        "level": 1.0 - level if is_of_humans else level,
+    }
+    kinds = [*_BELOW.get(name, ())]
+    kinds += ["no_ends"] * (name == "judges" and questions.target is None)
+    return [note(kind, **values) for kind in kinds]
 
 
 # Answers to what a gate on their rows may be about
@@ -563,10 +555,14 @@ def _with_gates(answers: Sequence[Answer], require: Sequence[str]) -> Iterator[A
                     rows.setdefault(f"{start}rate", (numbers, row))
     numbers_of = {name: numbers for name, (numbers, _) in rows.items()}
     about = {"what": "a judge or rate", "example": "gpt-4o.winning_rate >= 0.5"}
-    gates = [
-        read_gate(text, numbers_of, where="--require", **about) for text in require
-    ]
-    results = [_held(gate, rows[gate.estimate][1]) for gate in gates]
+    results = []
+    for text in require:
+        gate = read_gate(text, numbers_of, where="--require", **about)
+        row = rows[gate.estimate][1]
+        number, reason = row.get(gate.number), row.get("reason")
+        if number is None:
+            number, reason = math.nan, "no interval was asked for: --target items"
+        results.append(gate.hold(number, reason))
     yield Answer(
         name="gates",
         rows=[result.record() for result in results],
@@ -581,10 +577,3 @@ def _with_gates(answers: Sequence[Answer], require: Sequence[str]) -> Iterator[A
             for result in results
         ],
     )
-
-
-def _held(gate: Gate, row: Row) -> GateResult:
-    number = row.get(gate.number)
-    if number is None:
-        return gate.hold(math.nan, "no interval was asked for: --target items")
-    return gate.hold(number, row.get("reason"))
