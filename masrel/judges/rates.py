@@ -430,6 +430,53 @@ def rate_estimates(
     )
 
 
+def label_allocation(
+    m: int, rate: float, *, sensitivity: float, specificity: float, pilot: int
+) -> float:
+    """Return how many of the items to label are best positives.
+
+    Parameters
+    ----------
+    m : int
+        Items to label in all.
+    rate : float
+        The rate that is expected, in (0, 1).
+    sensitivity, specificity : float
+        The judge's shares in a pilot, each in [0, 1].
+    pilot : int
+        Labelled items of each kind in the pilot.
+
+    Returns
+    -------
+    float
+        Positives with which the corrected rate is most precise; the rest of the m items
+        are negatives.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is outside its range.
+
+    References
+    ----------
+    .. [1] Lee, C., et al. (2025). How to correctly report LLM-as-a-judge evaluations.
+       https://arxiv.org/abs/2511.21140
+
+    Examples
+    --------
+    >>> round(label_allocation(200, 0.4, sensitivity=0.9, specificity=0.7, pilot=20))
+    61
+    """
+    check_count("m", m)
+    check_count("pilot", pilot)
+    check_share("sensitivity", sensitivity)
+    check_share("specificity", specificity)
+    check_level(rate, "rate")
+    # κ of [1]: how much more the specificity varies than the sensitivity
+    kappa = (pilot * (1.0 - specificity) + 1.0) / (pilot * (1.0 - sensitivity) + 1.0)
+    return m / (1.0 + (1.0 / rate - 1.0) * math.sqrt(kappa))
+
+
 def labels_needed(
     half_width: float,
     *,

@@ -16,6 +16,7 @@ from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.judges import (
     RateEstimate,
     corrected_rate,
+    label_allocation,
     labels_needed,
     prediction_powered_mean,
     rate_estimates,
@@ -46,6 +47,13 @@ def graded(counts: dict[str, int]) -> tuple[dict[int, str], dict[int, str]]:
 def by_method(counts: dict[str, int], grade: str = "p") -> dict[str, RateEstimate]:
     result = rate_estimates(*graded(counts), grade=grade)
     return {row.method: row for row in result.rows}
+
+
+@pytest.mark.parametrize("row", ORACLE["label_allocation"])
+def test_labels_are_allocated_as_published(row: dict[str, Any]) -> None:
+    shares = {"sensitivity": row["q1"], "specificity": row["q0"]}
+    positives = label_allocation(row["m"], row["p"], pilot=row["m_pilot"], **shares)
+    assert positives == pytest.approx(row["m1"], **SAME)
 
 
 @pytest.mark.parametrize("row", ORACLE["corrected_rate"])
