@@ -12,7 +12,7 @@ import pytest
 
 from tests.cli.process import Caller, Done
 from tests.faults import Faults
-from tests.lab.flow.cuts import Syscall, contents, masrel_command
+from tests.lab.flow.cuts import Syscall, masrel_command
 from tests.lab.run.conftest import PROTOCOL
 
 PLAN = """
@@ -48,38 +48,6 @@ class Bench:
         text = path.read_text(encoding="utf-8")
         assert old in text, (name, old)
         path.write_text(text.replace(old, new, 1), encoding="utf-8")
-
-
-def outputs_on_links(bench: Bench) -> None:
-    profile = bench.study.parent / "profile"
-    profile.write_text("mine")
-    for name in ("ratings/ratings.csv", "analysis.json", "report/report.html"):
-        (bench.study / name).unlink(missing_ok=True)
-        (bench.study / name).parent.mkdir(exist_ok=True)
-        (bench.study / name).symlink_to(profile)
-    for verb in ("ratings", "analyze", "report"):
-        bench(verb)
-    assert profile.read_text() == "mine"
-
-
-def a_folder_that_is_a_link(bench: Bench) -> None:
-    home = bench.study.parent / "home"
-    home.mkdir()
-    for name, verb in (("ratings", "ratings"), ("report", "report")):
-        shutil.rmtree(bench.study / name, ignore_errors=True)
-        (bench.study / name).symlink_to(home)
-        assert "got a link to" in bench(verb, code=2).err
-        (bench.study / name).unlink()
-    assert not list(home.iterdir())
-
-
-def outputs_over_records(bench: Bench) -> None:
-    before = contents(bench.study)
-    log, protocol = "sessions/test_R1.jsonl", "protocol.toml"
-    bench("analyze", "--json", bench.study / log, code=2)
-    bench("ratings", "-o", bench.study / protocol, code=2)
-    bench("report", "-o", bench.study / "sessions", code=2)
-    assert contents(bench.study) == before
 
 
 def a_file_system_without_locks(bench: Bench) -> None:

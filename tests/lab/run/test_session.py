@@ -5,11 +5,7 @@ import errno
 import hashlib
 import io
 import os
-import re
-import shutil
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 from itertools import pairwise
@@ -312,15 +308,31 @@ def test_a_correction_is_a_new_event_with_who_and_why_and_the_grade_stays(
     assert read_log(study.log_file("R1", "test")) == log
 
 
-def test_a_recording_is_on_disk_before_the_log_names_it(
+class Noting(ScriptGrades):
+    """A script that notes when a grade is asked."""
+
+    def __init__(self, order: list[str]) -> None:
+        super().__init__(["1", "1", "1"])
+        self.order = order
+
+    def grade(self, request: GradeRequest) -> str | None:
+        self.order.append("asked")
+        return super().grade(request)
+
+
+def test_all_is_on_disk_before_the_next_is_asked_and_a_recording_before_its_line(
     small: Small, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order: list[str] = []
+    folders: set[Path] = set()
     fsync, replace = os.fsync, os.replace
 
     def noted(descriptor: int) -> None:
         fsync(descriptor)
-        order.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")).suffix)
+        path = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+        order.append(path.suffix)
+        if "asked" not in order and path.is_dir():
+            folders.add(path)
 
     def renamed(part: Path, path: Path) -> None:
         replace(part, path)
@@ -328,14 +340,15 @@ def test_a_recording_is_on_disk_before_the_log_names_it(
 
     monkeypatch.setattr(os, "fsync", noted)
     monkeypatch.setattr(os, "replace", renamed)
-    run(small, ScriptGrades(["1", "1", "1"]))
-    kinds = (".part", ".npz", ".json", ".jsonl")
-    written = [suffix for suffix in order if suffix in kinds]
-    assert written == [
+    study, _ = small
+    run(small, Noting(order))
+    kinds = (".part", ".npz", ".json", ".jsonl", "asked")
+    assert [word for word in order if word in kinds] == [
         ".jsonl",
-        *[".part", ".part", ".json", ".npz", ".jsonl", ".jsonl"] * 3,
+        *[".part", ".part", ".json", ".npz", ".jsonl", "asked", ".jsonl"] * 3,
         ".jsonl",
     ]
+    assert folders >= {study.root, study.sessions, study.sessions / "test_R1"}
 
 
 def test_a_full_disk_between_a_recording_and_its_line_loses_neither(
@@ -369,58 +382,6 @@ def test_a_sensor_is_recorded_with_noise_of_its_own_each_time(
         measured.append(recording.columns[MEASURED_TORQUE.column][:20].tolist())
     assert len(measured) == 3
     assert all(one != other for one, other in pairwise(measured))
-
-
-_CALL = re.compile(r"(?:\d+ +)?(fsync|write)\((\d+)<([^>]*)>(.*)")
-
-
-def calls_of(study: StudyPaths, tmp_path: Path) -> list[tuple[str, str, str]]:
-    """Name, file and text of each sync and write of a session that is stopped."""
-    log = tmp_path / "calls.txt"
-    code = "from masrel.cli import main; main()"
-    verb = ["run", str(study.root), "--rater", "R1", "--session", "test"]
-    done = subprocess.run(
-        [
-            *("strace", "-f", "-y", "-s", "60", "-o", str(log)),
-            *("-e", "trace=fsync,write", sys.executable, "-c", code, *verb),
-            *("--clock", "simulated"),
-        ],
-        input="\n1\nstop\n",
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1, done.stderr  # stopped on request
-    lines = log.read_text(errors="replace").splitlines()
-    matches = filter(None, map(_CALL.match, lines))
-    return [(match[1], match[3], match[4]) for match in matches]
-
-
-@pytest.mark.slow
-def test_everything_is_synced_before_the_first_grade_is_asked(
-    small: tuple[StudyPaths, Protocol], tmp_path: Path
-) -> None:
-    if shutil.which("strace") is None:
-        pytest.skip("needs strace: it shows the calls of the system in their order")
-    study, _ = small
-    calls = calls_of(study, tmp_path)
-    asked = next(i for i, (_, _, text) in enumerate(calls) if "Grade of" in text)
-    synced = {file for name, file, _ in calls[:asked] if name == "fsync"}
-    folders = {study.root, study.sessions, study.sessions / "test_R1"}
-    assert synced >= {str(path) for path in folders}
-    # the recording and its facts, while they had other names, and the log after them
-    parts = {file for file in synced if "/test_R1/" in file}
-    assert len(parts) == 2
-    log = str(study.log_file("R1", "test"))
-    logged = [(name, file) for name, file, _ in calls[:asked] if file == log]
-    assert logged == [("write", log), ("fsync", log)] * 2  # session, presented
-    last = next(i for i in range(asked, 0, -1) if calls[i][1] == log)
-    assert last > max(i for i in range(asked) if calls[i][1] in parts)
-    # the grade is on disk before the next presentation begins
-    after = [
-        call for call in calls[asked + 1 :] if call[1] == log or call[0] == "write"
-    ]
-    assert [(name, file) for name, file, _ in after[:2]] == logged[:2]
 
 
 @pytest.mark.parametrize(
