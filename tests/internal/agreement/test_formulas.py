@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 
 from masrel.agreement import COEFFICIENTS, WeightName, coefficient, declared_weights
-from masrel.agreement._engine import Formula
 
 FORMULAS = {
     **{name: entry.formula for name, entry in COEFFICIENTS.items() if entry.formula},
@@ -24,7 +23,7 @@ def test_a_slope_is_the_derivative_of_the_value(
     name: str, weights: WeightName, has_gaps: bool
 ) -> None:
     formula = FORMULAS[name]
-    assert isinstance(formula, Formula)
+    assert formula is not None
     rng = np.random.default_rng(3)
     n_raters = 2 if coefficient(formula.name).n_raters == (2, 2) else 4
     is_icc = name.startswith("icc")  # of complete tables, and of what categories weigh

@@ -23,7 +23,9 @@ import pytest
 
 from masrel.lab._event_log import events_before_torn
 from masrel.lab._study_files import is_cut_off
+from masrel.lab.protocol import StudyPaths
 from masrel.lab.run import Event, read_log
+from masrel.lab.schedule._secret import find_secret
 
 NOTES = ".masrel_cache"  # of a report, beside it
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
@@ -79,6 +81,13 @@ def _whole_files(root: Path) -> Iterator[Path]:
         left_out = any(part.startswith((".masrel-", NOTES)) for part in places)
         if path.is_file() and not left_out and path.suffix != ".torn":
             yield path
+
+
+def commitment_of(root: Path) -> str:
+    """What a study's secret is committed to by; fails where there is no secret."""
+    key = find_secret(StudyPaths(root))
+    assert key is not None
+    return key.commitment
 
 
 @contextmanager

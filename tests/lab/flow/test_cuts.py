@@ -16,7 +16,6 @@ from masrel.cli import cli
 from masrel.errors import MasrelError
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.ratings import read_study_data
-from masrel.lab.schedule._secret import find_secret
 from masrel.lab.verification import verify_study
 from tests.cli.process import Caller
 from tests.faults import Faults
@@ -31,6 +30,7 @@ from tests.lab.flow.cuts import (
     called_before,
     check_links,
     check_old_or_new,
+    commitment_of,
     events_and_contents,
     full_disk_at,
     killed_by_strace,
@@ -300,10 +300,7 @@ class Traced:
             if path.startswith(drawn) or path.endswith(".tsr"):
                 there[path] = "made"
         if (plan := self.root / "plan.json").exists():
-            key = find_secret(StudyPaths(self.root))
-            there[plan.name] = str(
-                key is not None and key.commitment in plan.read_text()
-            )
+            there[plan.name] = str(commitment_of(self.root) in plan.read_text())
         return there
 
     def finished(self) -> Contents:

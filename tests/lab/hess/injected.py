@@ -25,12 +25,11 @@ from masrel.lab.hess import (
     SimulatedHand,
     StretchRules,
     open_device,
+    run_presentation,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.recording import read_recording
+from masrel.lab.recording import read_recording, write_recording
 from masrel.lab.run import SimulatedGrades, model_controller, read_log, run_session
-from masrel.lab.run import _present as presenting
-from masrel.lab.run._presenter import CLOCKS
 from masrel.lab.schedule import write_schedules
 
 from . import faults as f
@@ -374,7 +373,6 @@ def _injected(
 ) -> Iterator[None]:
     # The first presentation alone gets the fault, and as many stretches
     first: dict = injection.first(n_stretches)
-    written, run = presenting.write_recording, presenting.run_presentation
 
     def open_faulty(name: str, **options) -> Device:
         clock, inner = options["clock"], opener(name, **options)
@@ -398,24 +396,24 @@ def _injected(
     def write(recording, path):
         if first.pop("full_disk", False):
             raise OSError(errno.ENOSPC, "full", str(path))
-        return written(recording, path)
+        return write_recording(recording, path)
 
     def hand(**options) -> SimulatedHand:
         return SimulatedHand(**options | first.pop("hand", {}))
 
     def run_first(*arguments, **options):
-        return run(*arguments, **options | first.pop("loop", {}))
+        return run_presentation(*arguments, **options | first.pop("loop", {}))
 
     with (
         mock.patch.multiple(
-            presenting,
+            "masrel.lab.run._present",
             open_device=open_faulty,
             model_controller=controller,
             write_recording=write,
             SimulatedHand=hand,
             run_presentation=run_first,
         ),
-        mock.patch.dict(CLOCKS, {"simulated": clock}),
+        mock.patch.dict("masrel.lab.run._presenter.CLOCKS", {"simulated": clock}),
     ):
         yield
 

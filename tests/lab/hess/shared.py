@@ -21,9 +21,28 @@ from masrel.lab.hess import (
     RealClock,
     run_presentation,
 )
-from masrel.lab.hess._stop import watched
+from masrel.lab.hess._stop import (
+    WATCHDOG,
+    Watchdog,
+    stop_on_key,
+    stop_on_signals,
+    watch,
+    watched,
+)
 
 from .rig import START, controls
+
+__all__ = [
+    "WATCHDOG",
+    "SharedDevice",
+    "SharedFile",
+    "Watchdog",
+    "made",
+    "stop_on_key",
+    "stop_on_signals",
+    "watch",
+    "watched",
+]
 
 FORMAT = "=dqq"  # torque N·m; when it was sent or idled, ns; mode: 1 torque, 0 idle
 SIZE = struct.calcsize(FORMAT)

@@ -21,18 +21,22 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import DeviceError, EmergencyStopError
-from masrel.lab.hess import EmergencyStop, IdleCommand, RealClock, SimulatedClock, _stop
-from masrel.lab.hess._stop import (
+from masrel.lab.hess import EmergencyStop, IdleCommand, RealClock, SimulatedClock
+
+from .rig import ActingClock, ScriptedDevice, present, scripted
+from .shared import (
     WATCHDOG,
+    SharedDevice,
+    SharedFile,
     Watchdog,
+    made,
     stop_on_key,
     stop_on_signals,
     watch,
     watched,
 )
 
-from .rig import ActingClock, ScriptedDevice, present, scripted
-from .shared import SharedDevice, SharedFile, made
+READY_AFTER_S = "masrel.lab.hess._stop._READY_AFTER_S"
 
 # The button
 
@@ -271,7 +275,7 @@ def prepare() -> None:
 def test_a_watchdog_that_cannot_reach_the_device_is_refused(
     idle: IdleCommand, patience_s: float, words: str, monkeypatch
 ) -> None:
-    monkeypatch.setattr(_stop, "_READY_AFTER_S", patience_s)
+    monkeypatch.setattr(READY_AFTER_S, patience_s)
     begun = time.monotonic()
     with pytest.raises(DeviceError, match=f"watchdog: {words}"), Watchdog(idle, 0.05):
         pass
@@ -283,7 +287,7 @@ def test_a_watchdog_that_does_not_end_is_ended(shared, monkeypatch) -> None:
         process = dog._process
         assert process is not None
         process.send_signal(signal.SIGSTOP)
-        monkeypatch.setattr(_stop, "_READY_AFTER_S", 0.2)
+        monkeypatch.setattr(READY_AFTER_S, 0.2)
     assert process.returncode == -signal.SIGKILL
 
 

@@ -288,24 +288,35 @@ def test_a_rater_is_asked_whether_to_go_on(
     assert ("restarted" in kinds_of(study)) is restart
 
 
+NO_WHOLE_NUMBERS = (11, 7.5, True, "nan", " ")
+
+
 def test_every_kind_of_questionnaire_is_asked_when_it_is_due(new_study: New) -> None:
     study, protocol = new_study(("[schedule]", QUESTIONS))
-    with pytest.raises(
-        ParameterError,
-        match=r"answer to realism\.score by R1 in session test: needed a whole number, "
-        "1 to 10, got 11",
+    for key, wrong, needed in (
+        ("each.sure", -1, "a number, 0 to 100"),
+        *(("realism.score", n, "a whole number, 1 to 10") for n in NO_WHOLE_NUMBERS),
+        ("realism.note", "\ud800", "text"),
     ):
-        run(study, protocol, grades=script(realism_score=11))
-    run(study, protocol)  # it is asked for again
+        of = f"answer to {key} (of ... )?by R1 in session test: needed {needed}, got "
+        with pytest.raises(ParameterError, match=of):
+            run(study, protocol, grades=script(**{key.replace(".", "_"): wrong}))
+    # what was refused is asked for again
+    run(study, protocol, grades=script(realism_score=" 7 ", realism_note=" it stuck "))
     answered = [e.fields for e in events_of(study) if e.kind == "answered"]
     codes = [e.fields["code"] for e in events_of(study) if e.kind == "grade"]
     assert [(f["question"], f["code"], f["answer"]) for f in answered] == [
         *(("sure", code, 50) for code in codes),
         ("score", None, 7),
-        ("note", None, None),
+        ("note", None, "it stuck"),
     ]
     assert not study.conduct_file.exists()  # the retest is still to come
+    later = script(each_sure="62.5", realism_note=" ", end_again="Yes")
+    with pytest.raises(ParameterError, match="needed one of yes, no, got 'Yes'"):
+        run(study, protocol, session="retest", grades=later)
     run(study, protocol, session="retest")
+    answered = [e.fields for e in events_of(study, "retest") if e.kind == "answered"]
+    assert [f["answer"] for f in answered] == [62.5, 62.5, 62.5, 7, None]
     last = dict(read_log(study.conduct_file)[-1].fields)
     assert list(last.values()) == ["R1", "end", "again", "yes"]
     run(study, protocol, session="retest")  # nothing is asked twice

@@ -1,5 +1,7 @@
 """Protocols to draw from, made without a file."""
 
+import hashlib
+from collections.abc import Iterator
 from typing import Any
 
 from masrel.lab.protocol import (
@@ -60,3 +62,17 @@ def protocol_of(
         sessions=tuple(Session(id=name, raters=raters) for name in sessions),
         schedule=ScheduleScheme(seed=seed, repeats=repeats, **rules),
     )
+
+
+def words_of(name: str) -> Iterator[int]:
+    """The words of a stream that is started from the SHA-256 of a name."""
+    return words_from(hashlib.sha256(name.encode()).hexdigest())
+
+
+def words_from(digest: str) -> Iterator[int]:
+    """PCG XSL RR 128/64 (O'Neill 2014, HMC-CS-2014-0905), started from 64 digits."""
+    state, increment = int(digest[:32], 16), int(digest[32:], 16) | 1
+    while True:
+        state = (state * 0x2360ED051FC65DA44385DF649FCCF645 + increment) & (2**128 - 1)
+        folded, turn = (state >> 64) ^ (state & (2**64 - 1)), state >> 122
+        yield ((folded >> turn) | (folded << (64 - turn))) & (2**64 - 1)

@@ -21,8 +21,13 @@ from masrel.lab.schedule import (
     schedule_problems,
     write_schedules,
 )
-from tests.lab.internal.schedule.test_stream import words_from, words_of
-from tests.lab.schedule.studies import SECRET, protocol_of, with_secret
+from tests.lab.schedule.studies import (
+    SECRET,
+    protocol_of,
+    with_secret,
+    words_from,
+    words_of,
+)
 
 MODELS = ("HM1", "HM2", "HM3", "HM4", "D01", "D02", "D03", "D04")
 LETTERS = "ABCDFGHJKMNPTUVWXY"

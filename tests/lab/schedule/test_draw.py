@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from masrel.errors import ScheduleError
 from masrel.lab.protocol import read_protocol
 from masrel.lab.schedule import Schedule, check_schedule, draw_schedule
-from tests.lab.internal.schedule.test_stream import words_of
-from tests.lab.schedule.studies import protocol_of
+from tests.lab.schedule.studies import protocol_of, words_of
 
 PUBLISHED = Path(__file__).parents[3] / "studies" / "hess2012" / "protocol.toml"
 

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from masrel.lab.schedule import draw_schedule
-from tests.lab.internal.schedule.test_stream import words_from
-from tests.lab.schedule.studies import SECRET, protocol_of
+from tests.lab.schedule.studies import SECRET, protocol_of, words_from
 
 PAGE = (Path(__file__).parents[3] / "docs" / "orders.md").read_text(encoding="utf-8")
 MODELS = ("HM1", "HM2", "HM3", "HM4", "D01", "D02", "D03", "D04")

@@ -26,6 +26,8 @@ from starlette.types import Message, Receive, Scope, Send
 from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
 from masrel.lab.run import read_log
+from masrel.lab.serve import _access as access
+from masrel.lab.serve import _middleware as middleware
 from masrel.lab.serve._access import LIFE_S, ROLES, Access, Role
 from masrel.lab.serve._coordinator import ACTIONS
 from masrel.lab.serve._live import SampleTail
@@ -47,13 +49,17 @@ __all__ = [
     "ACTIONS",
     "LIFE_S",
     "ROLES",
+    "Access",
     "AskOverError",
+    "Middleware",
     "Role",
     "SampleTail",
     "SessionManager",
+    "access",
     "alone",
     "encryption",
     "listen",
+    "middleware",
 ]
 
 PATIENCE_S = 60.0

@@ -16,15 +16,22 @@ import pytest
 from starlette.responses import HTMLResponse, JSONResponse
 from starlette.types import Receive, Scope, Send
 
-from masrel.lab.serve import _access, _middleware, _server
-from masrel.lab.serve._middleware import Middleware
-from tests.lab.serve.pages import ROLES, Role, Running, Site
+from tests.lab.serve.pages import (
+    ROLES,
+    Access,
+    Middleware,
+    Role,
+    Running,
+    Site,
+    access,
+    middleware,
+)
 
 Attack = Callable[[Site], bool]
 Removal = Callable[[pytest.MonkeyPatch], None]
 
 
-def set_to(name: str, value: object, of: object = _middleware) -> Removal:
+def set_to(name: str, value: object, of: object = middleware) -> Removal:
     """Set a limit or a function."""
     return lambda patch: patch.setattr(of, name, value)
 
@@ -160,44 +167,44 @@ def twice(patch: pytest.MonkeyPatch) -> None:
         def remove(self, _: object) -> None:
             pass
 
-    begin = _access.Access.__init__
+    begin = Access.__init__
 
-    def init(self: _access.Access, *args: object, **options: object) -> None:
+    def init(self: Access, *args: object, **options: object) -> None:
         begin(self, *args, **options)  # type: ignore[arg-type]
         self._tokens = Kept()  # type: ignore[assignment]
 
-    patch.setattr(_access.Access, "__init__", init)
+    patch.setattr(Access, "__init__", init)
 
 
 def any_token(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_access, "_same", lambda tokens, *_: tokens[0] if tokens else None)
-    new = _access.Access.let_in
+    patch.setattr(access, "_same", lambda tokens, *_: tokens[0] if tokens else None)
+    new = Access.let_in
 
-    def let_in(self: _access.Access, role: Role, *token: str) -> _access.Visitor:
+    def let_in(self: Access, role: Role, *token: str) -> access.Visitor:
         if not self._tokens:
             self.new_address(role)
         return new(self, role, *token)  # type: ignore[call-arg,arg-type]
 
-    patch.setattr(_access.Access, "let_in", let_in)
+    patch.setattr(Access, "let_in", let_in)
 
 
 def any_role(patch: pytest.MonkeyPatch) -> None:
-    visitor = _access.Access.visitor
+    visitor = Access.visitor
 
     def anybody(
-        self: _access.Access, role: Role, cookies: dict[str, str]
-    ) -> _access.Visitor | None:
+        self: Access, role: Role, cookies: dict[str, str]
+    ) -> access.Visitor | None:
         known = [visitor(self, each, cookies) for each in (role, *ROLES)]
         tablets = [each.tablet for each in known if each]
-        return _access.Visitor(role, tablets[0]) if tablets else None
+        return access.Visitor(role, tablets[0]) if tablets else None
 
-    patch.setattr(_access.Access, "visitor", anybody)
+    patch.setattr(Access, "visitor", anybody)
 
 
 ANY_MAC = set_to("compare_digest", lambda *_: True, hmac)
 ANY_PAGE = set_to("_check_page", nothing, Middleware)
 ANY_SENDER = set_to("_check_sender", nothing, Middleware)
-ANY_RATE = set_to("allow", lambda *_: True, _middleware._Budgets)
+ANY_RATE = set_to("allow", lambda *_: True, middleware._Budgets)
 ANY_SIZE = set_to("_MAX_BODY", 10**9)
 LONG = {"answer": "x" * 70_000}
 STOP, STATE = ("rater", "POST", "/rater/stop"), ("rater", "GET", "/rater/state")
@@ -214,7 +221,7 @@ GUARDS: dict[str, tuple[Attack, Removal]] = {
     "study of a cookie": (cookie_of_another_study, ANY_MAC),
     "life of a cookie": (
         stolen_cookie_of_last_month,
-        set_to("LIFE_S", 10**9, _access),
+        set_to("LIFE_S", 10**9, access),
     ),
     "roles": (rater_at_the_coordinators_pages, any_role),
     "CSRF": (sends(*START, "/coordinator/start", X_Masrel_CSRF="0" * 64), ANY_PAGE),
@@ -337,23 +344,23 @@ def no_checks(patch: pytest.MonkeyPatch) -> None:
 
 
 def no_policy(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_middleware, "_OF_PAGES", "default-src * 'unsafe-inline'")
-    patch.setattr(_middleware, "_HEADERS", {"Cache-Control": "no-store"})
+    patch.setattr(middleware, "_OF_PAGES", "default-src * 'unsafe-inline'")
+    patch.setattr(middleware, "_HEADERS", {"Cache-Control": "no-store"})
 
 
 def readable(patch: pytest.MonkeyPatch) -> None:
-    cookie = _access.Access.cookie
+    cookie = Access.cookie
     plain = lambda *args: cookie(*args).replace("HttpOnly; ", "")  # noqa: E731
-    patch.setattr(_access.Access, "cookie", plain)
+    patch.setattr(Access, "cookie", plain)
 
 
 def by_a_link(patch: pytest.MonkeyPatch) -> None:
-    page = _middleware.page
+    page = middleware.page
 
     def clicked(name: str, **context: object) -> str:
         return page(name, **context).replace('http-equiv="refresh"', "")
 
-    patch.setattr(_middleware, "page", clicked)
+    patch.setattr(middleware, "page", clicked)
 
 
 BY_PAGES: dict[str, tuple[Callable[..., Awaitable[bool]], Removal]] = {
@@ -378,7 +385,7 @@ def test_no_page_does_what_only_ours_may_and_each_does_without_its_guard(
         (attack, without), victim = BY_PAGES[name], Victim()
         with monkeypatch.context() as patch:
             made = lambda _, access: Middleware(victim, access)  # noqa: E731
-            patch.setattr(_server, "make_app", made)
+            patch.setattr("masrel.lab.serve._server.make_app", made)
             if not guarded:
                 without(patch)
             async with Running(tmp_path / f"{name} {guarded}") as server:

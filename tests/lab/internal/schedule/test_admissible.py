@@ -21,6 +21,7 @@ from masrel.lab.schedule._admissible import (
     subset,
 )
 from masrel.lab.schedule._orders import count_orders, order_at
+from masrel.lab.schedule._secret import Stream
 from tests.lab.schedule.studies import protocol_of
 
 LIMITED = [
@@ -226,3 +227,21 @@ def test_numbers_are_one_to_one_with_words_under_both_limits(
     assert len(numbered) == len(admissible)
     assert set(numbered) == admissible
     assert len(words._counts) <= words.n_remainders
+
+
+class Given(Stream):
+    """A stream of words that are given."""
+
+    def __init__(self, *words: int) -> None:
+        self._words = iter(words)
+
+    def word(self) -> int:
+        return next(self._words)
+
+
+def test_words_beyond_the_last_multiple_are_rejected() -> None:
+    # 2**64 = 3 * 6148914691236517205 + 1: the word 2**64 - 1 would favour 0
+    assert Given(2**64 - 1, 2**64 - 2).below(3) == 2
+    # a power of two divides 2**64: no word is rejected
+    assert Given(2**64 - 1).below(8) == 7
+    assert Given(5).below(1) == 0
