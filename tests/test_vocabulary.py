@@ -5,11 +5,9 @@ import math
 import warnings
 from xml.etree import ElementTree
 
-import pytest
-
 import masrel
 from masrel import errors
-from masrel.errors import MasrelError, MasrelWarning, ParameterError
+from masrel.errors import MasrelError, MasrelWarning
 from masrel.estimates import Estimate, Interval, as_document
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 
@@ -28,19 +26,6 @@ def estimate(**changes: object) -> Estimate:
         n_categories=6,
     )
     return dataclasses.replace(plain, **changes)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("grades", "match"),
-    [
-        ((), "at least one"),
-        (("a", ""), "text"),
-        (("a", "b", "a"), r"repeated: \['a'\]"),
-    ],
-)
-def test_a_scale_that_is_none_is_refused(grades: tuple[str, ...], match: str) -> None:
-    with pytest.raises(ParameterError, match=match):
-        Scale(name="S", grades=grades)
 
 
 INTERVAL_KEYS = [

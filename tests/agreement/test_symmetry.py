@@ -167,20 +167,6 @@ def test_no_kappa_is_above_the_largest(cells: Cells) -> None:
     assert (most == 1.0) == (rows == columns)
 
 
-@pytest.mark.parametrize("function", [prevalence_index, bias_index, kappa_max])
-@pytest.mark.parametrize(
-    ("table", "said"),
-    [
-        ([[1, 2, 3], [4, 5, 6]], "as many rows as columns"),
-        ([[1, -1], [0, 2]], "row 0, column 1"),
-        ([[0.5, 1], [0, 2]], "0.5"),
-    ],
-)
-def test_what_is_no_table_of_counts_is_refused(function, table, said) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(CountsError, match=said):
-        function(table)
-
-
 DIAGNOSES = ["depression", "personality", "schizophrenia", "neurosis", "other"]
 
 # Fleiss (1971), Table 1: psychiatrists, of six, who chose each for thirty patients.

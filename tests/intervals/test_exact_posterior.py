@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from numpy.typing import NDArray
 
-from masrel.errors import ConvergenceError, ParameterError, UndefinedStatisticWarning
+from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior
 from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
@@ -155,31 +155,6 @@ def test_where_the_prior_alone_would_speak_it_is_undefined(
     assert math.isnan(result.low)
     assert math.isnan(result.high)
     assert (result.reason, result.kind) == (reason, "credible")
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"level": 1.0},
-        {"prior": "flat"},
-        {"concentration": 0.0},
-        {"concentration": math.inf},
-        {"n_draws": 99},
-        {"weights": "linear", "model": "dirichlet-multinomial"},
-        {"target": "raters"},
-        {"coefficient": "kendall_w"},
-    ],
-)
-def test_what_the_model_does_not_answer_is_refused(options: dict[str, object]) -> None:
-    asked = {"coefficient": "fleiss_kappa", "target": "items", **options}
-    with pytest.raises(ParameterError):
-        posterior(ratings=[["a", "b"], ["a", "a"]], **asked)  # type: ignore[arg-type]
-
-
-def test_more_ratings_than_can_be_multiplied_out_are_refused() -> None:
-    ratings = np.broadcast_to([0, 1, 0, 0], (250_001, 4))
-    with pytest.raises(ConvergenceError):
-        posterior("fleiss_kappa", ratings, target="items", categories=[0, 1])
 
 
 Floats = NDArray[np.float64]

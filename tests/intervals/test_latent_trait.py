@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from masrel.errors import ConvergenceError, MasrelError, ParameterError
+from masrel.errors import ConvergenceError, ParameterError
 from masrel.intervals import LatentPrior, LatentTrait, latent_trait
-from tests.intervals.data import SCALE, TABLE_V
+from tests.intervals.data import SCALE
 from tests.intervals.latent_studies import drawn
 
 SMALL = [[1, 1, 2], [2, 2, 2], [3, 4, 3], [4, 4, 3]]
@@ -88,29 +88,6 @@ def test_labels_give_the_names_and_what_has_no_rating_is_left_out() -> None:
     assert [one.name for one in result.items] == ["HM1", "HM3", "HM4"]
     assert [one.name for one in result.raters] == ["A", "B", "D"]
     assert (result.kappa.n_items, result.kappa.n_raters) == (3, 3)
-
-
-@pytest.mark.parametrize(
-    ("ratings", "options"),
-    [
-        (SMALL, {"items": "both"}),
-        (SMALL, {"level": 95}),
-        (SMALL, {"n_steps": 5}),
-        (SMALL, {"rng": -1}),
-        (TABLE_V, {"categories": None}),
-        ([[2, 2], [2, 2]], {"categories": None}),
-        (SMALL, {"categories": [1, 2, 3]}),
-        ([[1, 2], [None, None]], {}),
-        ([[1, None], [None, 2]], {}),
-        ([[1, 1], [4, 4], [2, None]], {}),
-        ([], {}),
-    ],
-)
-def test_what_the_model_cannot_answer_is_refused(
-    ratings: list[list[object]], options: dict[str, object]
-) -> None:
-    with pytest.raises(MasrelError):
-        fitted(ratings, **options)
 
 
 @pytest.mark.parametrize(

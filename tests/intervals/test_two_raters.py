@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import betaincinv
 
-from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior
 
@@ -181,27 +181,3 @@ def test_where_nothing_can_be_said_it_is_undefined(
         )
     assert math.isnan(result.low)
     assert (result.reason, result.kind) == (reason, "credible")
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"coefficient": "kendall_w"},
-        {"model": "tables"},
-        {"prior": "jeffreys"},
-        {"target": "raters"},
-        {"concentration": -1.0},
-        {"n_draws": 50},
-        {"ratings": [["a", "b", "a"]] * 12},
-    ],
-)
-def test_what_the_table_does_not_answer_is_refused(options: dict[str, object]) -> None:
-    asked: dict[str, object] = {
-        "coefficient": "cohen_kappa",
-        "ratings": [["a", "b"]] * 12,
-        "target": "items",
-        "model": "table",
-        **options,
-    }
-    with pytest.raises(ParameterError):
-        posterior(**asked)  # type: ignore[arg-type]

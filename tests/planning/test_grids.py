@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from masrel.errors import ParameterError
 from masrel.planning import Study, plan_grid, precision, sample_size
 
 STUDY = Study(
@@ -42,21 +41,6 @@ def test_one_size_can_be_solved_for_in_every_cell() -> None:
     assert plans[-1] == sample_size(replace(SOLVED, value=0.8, n_raters=3))
     (unreached,) = plan_grid(replace(SOLVED, value=0.6, n_items=10))
     assert (unreached.reaches_aim, unreached.n_raters) == (False, 60)
-
-
-@pytest.mark.parametrize(
-    ("study", "options", "name"),
-    [
-        (STUDY, {}, "n_items, n_raters"),
-        (replace(STUDY, half_width=None), {"n_items": 9}, "half_width"),
-        (STUDY, {**RANGES, "executor": "slurm"}, "executor"),
-        (STUDY, {**RANGES, "scheduler": "x:1"}, "scheduler"),
-        (replace(STUDY, method="wald"), RANGES, "method"),
-    ],
-)
-def test_bad_grids_are_refused(study: Study, options: Any, name: str) -> None:
-    with pytest.raises(ParameterError, match=f"^{name}: "):
-        plan_grid(study, **options)
 
 
 @pytest.fixture

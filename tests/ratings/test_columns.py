@@ -394,19 +394,3 @@ def test_raters_whose_names_are_no_criteria(tmp_path: Path, names: str) -> None:
     assert file.read["raters"] == names.split(",")
     with pytest.raises(RatingsError, match="--by-criterion: needs columns"):
         read(tmp_path, criteria(names), by_criterion=True)
-
-
-@pytest.mark.parametrize(
-    ("names", "options", "words"),
-    [
-        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"by": "essay"}, "and not with"),
-        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"counts": True}, "and not with"),
-        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"raters": "Yun"}, "needs columns"),
-        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"stream": True}, "whole file"),
-    ],
-)
-def test_criteria_that_are_refused(
-    tmp_path: Path, names: str, options: dict[str, Any], words: str
-) -> None:
-    with pytest.raises((RatingsError, ParameterError), match=words):
-        read(tmp_path, criteria(names), by_criterion=True, **options)

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 import statsmodels.api as sm
 from scipy.optimize import minimize
 
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.errors import UndefinedStatisticWarning
 from masrel.lab.analysis import grade_regression
 from masrel.lab.protocol import Protocol, read_protocol, scale_of
 from masrel.lab.ratings import Ratings, ratings_from_rows, read_study_ratings
@@ -176,26 +175,3 @@ def test_a_constant_predictor_is_named_and_ratings_without_a_speed_are_counted(
         found[name] = grade_regression(protocol, changed, predictors=("speed", "H"))
     assert found["same"].dropped == (("speed", "it is the same in all ratings"),)
     assert (found["gaps"].n_missing, found["gaps"].n_ratings) == (5, 115)
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"predictors": ("b",)}, "predictors: need some of L, H, Q, D, speed"),
-        ({"predictors": ()}, "got none"),
-        ({"predictors": ("H", "H")}, "each once, got H, H"),
-        ({"session": "third"}, "session: needs one of test"),
-        ({"level": 0.2}, "level: needs more than 0.5"),
-    ],
-)
-def test_what_there_is_not_is_refused(
-    tmp_path: Path, options: dict[str, object], said: str
-) -> None:
-    with pytest.raises(ParameterError, match=said):
-        grade_regression(*made_up(tmp_path), **options)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("lacks", [{"cuts": (99.0,)}, {"n_raters": 1}])
-def test_one_grade_or_one_rater_is_refused(tmp_path: Path, lacks: Any) -> None:
-    with pytest.raises(RatingsError, match="needs two grades and two raters"):
-        grade_regression(*made_up(tmp_path, **lacks))

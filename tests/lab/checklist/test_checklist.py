@@ -13,7 +13,6 @@ import docx
 import pytest
 from markupsafe import escape
 
-from masrel.errors import ParameterError
 from masrel.lab.checklist import (
     checklist_markdown,
     fill_checklist,
@@ -223,14 +222,3 @@ def test_each_form_has_every_fact(rated: Small, tmp_path: Path) -> None:
         for text in (item.topic, *item.facts):
             assert text in said
             assert str(escape(text)) in page
-
-
-def test_what_is_wrong_is_said_in_one_sentence(tmp_path: Path, small: Small) -> None:
-    study, protocol = small
-    with pytest.raises(ParameterError, match="guideline: needed one of grras, cosmin"):
-        fill_checklist(study, protocol, "strobe")
-    checklist = fill_checklist(study, protocol, "grras")
-    with pytest.raises(ParameterError, match=r"ends in \.html, \.md, \.docx, got"):
-        write_checklist(checklist, tmp_path / "list.pdf")
-    with pytest.raises(ParameterError, match="sessions"):
-        write_checklist(checklist, study.sessions / "x.html")

@@ -94,13 +94,3 @@ def test_a_file_that_hides_whether_it_is_simulated_is_refused(
     assert "a.toml: simulated must be true or false" in said
     edit(path, 'simulated = "no"\n', "")
     assert "got nothing" in refused(masrel("joint", "between", "HM1", path, "-n", "1"))
-
-
-def test_models_that_read_the_law_differently_have_nothing_between(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = simulated(tmp_path / "a.toml")
-    with path.open("a", encoding="utf-8") as file:
-        file.write('[constants]\npost_catch = "additive"\n')
-    said = refused(masrel("joint", "between", "HM1", path, "-n", "1"))
-    assert said.startswith("models: HM1 and a need one post_catch")

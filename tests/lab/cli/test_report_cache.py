@@ -281,14 +281,6 @@ def test_a_full_disk_leaves_a_report(
     assert (study / "report/report.html").is_file()
 
 
-def test_a_cache_in_the_place_of_records_is_refused(
-    masrel: Caller, study: Path
-) -> None:
-    done = masrel("report", study, "--cache", study / "sessions")
-    assert (done.code, done.err.count("\n")) == (2, 1)
-    assert not (study / "report").exists()
-
-
 def test_a_report_that_another_build_has_replaced_is_made_again(
     masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

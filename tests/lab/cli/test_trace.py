@@ -16,13 +16,12 @@ from masrel.lab.elbow import (
     MODELS,
     STANDARD_MODELS,
     ConstantSpeed,
-    evaluate,
     events,
 )
 from masrel.lab.elbow.identification import as_toml, model_document
 from masrel.lab.elbow.tone import ClaspKnife, Contracture, ToneModel
 from masrel.lab.recording import RECORDING_COLUMNS, Recording, write_recording
-from tests.lab.elbow.stretches import constant, minimum_jerk
+from tests.lab.elbow.stretches import minimum_jerk
 
 HM3 = STANDARD_MODELS["HM3"]
 
@@ -40,27 +39,6 @@ def scene(*arguments: object, command: str = "trace") -> dict:
 
 
 STRETCH = ("--model", "HM3", "--speed-deg-s", 92)
-
-
-def test_samples_are_those_of_the_sampled_law(tmp_path: Path) -> None:
-    path = tmp_path / "trace.csv"
-    scene(*STRETCH, "--csv", path, "--rate-hz", 100)
-    with path.open(encoding="utf-8", newline="") as file:
-        assert file.readline() == "# simulated: true\n"
-        rows = list(csv.DictReader(file))
-    assert list(rows[0]) == [
-        "time_s",
-        "angle_deg",
-        "velocity_deg_s",
-        "torque_nm",
-        "phase",
-    ]
-    assert len(rows) == 127  # 0 to 1.26 s
-    # Sample 57 is at 82.44 deg, 58 at 83.36 deg, the first beyond 82.8 deg.
-    assert [row["phase"] for row in rows[57:59]] == ["pre-catch", "catch"]
-    # 1.26 · 92 + 3.15 · 53.36 + 2.8 · 92 = 115.92 + 168.084 + 257.6
-    found = [float(number) for number in list(rows[58].values())[:4]]
-    assert found == pytest.approx([0.58, 83.36, 92.0, radians(541.604)])
 
 
 # Motions
@@ -95,24 +73,6 @@ def test_a_recording_of_the_loop_is_traced_by_either_of_its_files(
 
 
 # Many scenes
-
-
-def test_models_times_speeds_make_a_table_and_a_list() -> None:
-    asked = ("--model", "HM2", "--model", "HM3", "--speeds-deg-s", 70, 90, 3)
-    made = scene(*asked)["scenes"]
-    assert [(one["model"], one["speed_deg_s"]) for one in made] == [
-        (model, speed) for model in ("HM2", "HM3") for speed in (70.0, 80.0, 90.0)
-    ]
-    peaks = [one["peak_torque_nm"] for one in made]
-    joints = [STANDARD_MODELS[one["model"]] for one in made]
-    motions = [constant(one["speed_deg_s"]) for one in made]
-    table = evaluate(joints, motions, ["peak_torque"])
-    assert table.column("peak_torque") == pytest.approx(peaks, rel=1e-14)
-    shown = run(*asked).stdout.splitlines()
-    assert len(shown) == 7
-    assert shown[0].split() == [
-        "model", "speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm",
-    ]  # fmt: skip
 
 
 # Figures
@@ -278,15 +238,6 @@ def test_a_fitted_model_is_traced_from_its_file(tmp_path: Path) -> None:
     variant = model_file(tmp_path, "S4.toml", rest_angle_deg=20.0)
     moved = scene("--model", variant, "--speed-deg-s", 92)["peak_torque_nm"]
     assert moved - made["peak_torque_nm"] == pytest.approx(radians(3.15 * 10))
-
-
-def test_two_files_of_one_name_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "other").mkdir()
-    one, two = model_file(tmp_path), model_file(tmp_path / "other")
-    done = run("--model", one, "--model", two, "--speed-deg-s", 92)
-    assert "--model: needs models whose names differ, got two called S3" in str(
-        done.exception
-    )
 
 
 # Other kinds of joints

@@ -112,22 +112,6 @@ def tick(clock: SimulatedClock, n: int = 1) -> None:
     clock.sleep_until_ns(clock.now_ns() + n * 1_000_000)
 
 
-@pytest.mark.parametrize("name", ["wam", *device_names()])
-def test_a_name_without_a_device_or_without_what_it_needs_is_refused(name: str) -> None:
-    with pytest.raises(
-        DeviceError, match=r": needs (a hand|options|one of .*simulated)"
-    ):
-        open_device(name, clock=SimulatedClock())
-
-
-@registered
-def test_options_of_another_backend_are_refused(backend: str) -> None:
-    foreign = {"hand": moving(), "options": BackendOptions()}
-    words = f"{backend}: needs options .* got BackendOptions"
-    with pytest.raises(DeviceError, match=words):
-        open_device(backend, clock=SimulatedClock(), **foreign)
-
-
 def test_every_backend_that_is_written_is_registered() -> None:
     # A backend is a module with a function `build` of a setup.
     written = {

@@ -6,7 +6,6 @@ from math import isnan
 import numpy as np
 import pytest
 
-from masrel.errors import ParameterError
 from masrel.lab.elbow import (
     STANDARD_MODELS,
     Columns,
@@ -150,65 +149,4 @@ def line(**columns: object) -> Columns:
     return Columns(ConstantSpeed, **{"start": 0.5, "end": 2.5, "speed": 1.0} | columns)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: Columns(dict, a=[1.0]), "kind: needs ElbowParameters, .* got dict"),
-        (lambda: line(speed=[1.0, 0.0]), "row 2: speed: needs more than 0"),
-        (lambda: line(speed=[1.0, np.nan, 2.0]), "row 2: speed: needs more than 0"),
-        (
-            lambda: Columns(
-                ElbowParameters,
-                catch_angle_constant=2.0,
-                catch_torque_constant=2.8,
-                residual_ratio=0.6,
-                catch_travel=0.5,
-                rest_angle=[np.nan, 0.5, np.inf],
-            ),
-            "row 3: rest_angle: needs a finite number, got inf",
-        ),
-        (lambda: line(end=[2.0, 2.5, 0.5]), "row 3: start, end: need 0 <= start < end"),
-        (
-            lambda: line(start=[0.1, 0.2], end=[1.0, 1.5, 2.0]),
-            "columns: need one length",
-        ),
-        (
-            lambda: evaluate(HM3, line(start=[0.5, 2.6], end=3.0)),
-            r"motions\[1\]\.start: needs less than the end of range",
-        ),
-    ],
-)
-def test_wrong_columns_are_refused_with_their_row(call, message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        call()
-
-
 # Refused
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: evaluate(HM3, constant(92.0), ["peak"]), "outputs: .* got 'peak'"),
-        (lambda: evaluate(HM3, constant(92.0), []), "outputs: .* got none"),
-        (
-            lambda: evaluate([HM3] * 3, [constant(92.0)] * 2),
-            "one of either, got 3 and 2",
-        ),
-        (lambda: evaluate([], []), "got 0 and 0"),
-        (lambda: evaluate(HM3, constant(92.0), chunk=0), "chunk: needs 1 or more"),
-        (
-            lambda: evaluate(
-                HM3, [constant(92.0), constant(92.0, start_deg=150.0, end_deg=160.0)]
-            ),
-            r"motions\[1\]\.start: needs less than the end of range, 146 degrees",
-        ),
-        (
-            lambda: evaluate(HM3, constant(92.0)).column("work"),
-            "output: needs one of catch_angle, peak_torque, got 'work'",
-        ),
-    ],
-)
-def test_wrong_calls_are_refused(call, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
-        call()

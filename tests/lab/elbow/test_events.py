@@ -5,7 +5,6 @@ from math import degrees, radians
 
 import pytest
 
-from masrel.errors import ParameterError
 from masrel.lab.elbow import (
     STANDARD_MODELS,
     ConstantSpeed,
@@ -140,11 +139,3 @@ def test_at_the_speed_of_the_smallest_angle_the_line_of_slower_speeds_holds() ->
         assert at.catch_angle == pytest.approx(0.78125, abs=1e-15)
     beyond = events(joint, ConstantSpeed(start=0.5, end=2.5, speed=1.75 * (1 + 1e-12)))
     assert beyond.catch_angle == pytest.approx(1.25, abs=1e-15)
-
-
-@pytest.mark.parametrize("start_deg", [146.0, 150.0])
-def test_a_stretch_cannot_start_at_or_beyond_the_end_of_range(start_deg: float) -> None:
-    motion = constant(60.0, start_deg=start_deg, end_deg=160.0)
-    said = rf"start: needs less than the end of range, 146 degrees, got {start_deg:g}"
-    with pytest.raises(ParameterError, match=said):
-        events(STANDARD_MODELS["HM1"], motion)

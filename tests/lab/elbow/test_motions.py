@@ -1,7 +1,5 @@
 """Motions: by hand, pieces against samples, refusals."""
 
-from math import inf, nan
-
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
@@ -9,19 +7,15 @@ from numpy.polynomial import Polynomial
 from masrel.errors import ParameterError
 from masrel.lab.elbow import (
     ConstantSpeed,
-    Hold,
-    Joined,
     MinimumJerk,
     Motion,
     Part,
     Recorded,
     Reversed,
     Trapezoid,
-    interrupted,
     times_at,
 )
 from tests.lab.elbow.scenes import KINDS, random_scene
-from tests.lab.elbow.stretches import constant, minimum_jerk
 
 # From 0.5 to 2.5 rad at a mean of 1 rad/s: 2 rad in 2 s.
 REACH = MinimumJerk(start=0.5, end=2.5, mean_speed=1.0)
@@ -124,84 +118,4 @@ def test_a_trapezoid_may_be_a_triangle_and_no_less() -> None:
 # Recorded
 
 
-@pytest.mark.parametrize(
-    ("time", "angle", "said"),
-    [
-        ([0.0], [0.5], "two or more samples and as many times as angles"),
-        ([0.0, 1.0], [0.5], r"got shapes \(2,\) and \(1,\)"),
-        ([0.0, 1.0, 1.0], [0.5, 0.6, 0.7], "time: needs to grow.*got 1 in sample 3"),
-        ([0.0, 2.0, 1.0], [0.5, 0.6, 0.7], "time: needs to grow.*got 1 in sample 3"),
-        ([0.0, nan], [0.5, 0.6], "time: needs finite numbers, got nan in sample 2"),
-        ([0.0, 1.0], [0.5, inf], "angle: needs finite numbers, got inf in sample 2"),
-        ([0.0, 1.0], [-0.1, 0.5], "angle: needs 0 to 180 degrees, got -5.7.* sample 1"),
-        ([0.0, 1.0], [0.5, 57.0], "angle: needs 0 to 180 degrees, got 3265.* sample 2"),
-    ],
-)
-def test_wrong_samples_are_refused_with_their_place(time, angle, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
-        Recorded(time=time, angle=angle)
-
-
 # Composed
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        *(
-            (
-                lambda kind=kind, ends=ends: kind(
-                    90.0, start_deg=ends[0], end_deg=ends[1]
-                ),
-                "start, end: need 0 <= start < end <= 180 degrees, "
-                f"got {ends[0]:g} and {ends[1]:g} degrees",
-            )
-            for kind in (constant, minimum_jerk)
-            for ends in (
-                (50.0, 50.0),
-                (60.0, 50.0),
-                (-1.0, 50.0),
-                (10.0, 181.0),
-                (nan, 50.0),
-                (10.0, nan),
-            )
-        ),
-        *(
-            (
-                lambda kind=kind, speed=speed: kind(speed),
-                f"^{name}: needs more than 0 and finite, got {speed:g} deg/s",
-            )
-            for kind, name in ((constant, "speed"), (minimum_jerk, "mean_speed"))
-            for speed in (0.0, -90.0, nan, inf)
-        ),
-        *(
-            (
-                lambda goal=goal: times_at(LINE, [goal]),
-                "angles: need ones that the motion reach",
-            )
-            for goal in (2.6, 0.4, nan, inf)
-        ),
-        (lambda: Joined([]), "motions: needs one or more, got none"),
-        (
-            lambda: Joined([LINE, LINE]),
-            r"motions\[1\]: needs to start at 143.239 degrees, .* got 28.6479 degrees",
-        ),
-        (
-            lambda: Hold(start=4.0, duration=1.0),
-            "start: needs 0 to 180 degrees, got 229",
-        ),
-        (
-            lambda: Hold(start=nan, duration=1.0),
-            "start: needs 0 to 180 degrees, got nan",
-        ),
-        (lambda: Hold(start=1.0, duration=0.0), "duration: needs more than 0 s"),
-        (lambda: Hold(start=1.0, duration=inf), "duration: needs more than 0 s"),
-        (lambda: Part(motion=LINE, begin=1.0, finish=1.0), "got 1 and 1 s"),
-        (lambda: Part(motion=LINE, begin=0.0, finish=3.0), "<= 2 s, the duration"),
-        (lambda: Part(motion=LINE, begin=-1.0, finish=1.0), "got -1 and 1 s"),
-        (lambda: interrupted(LINE, at=2.0, pause=1.0), "got 2 and 2 s"),
-    ],
-)
-def test_movements_that_cannot_be_are_refused(make, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
-        make()

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from rocrate.rocrate import ROCrate
 
-from masrel.errors import ParameterError
 from masrel.lab.analysis import analyze, as_analysis_document
 from masrel.lab.conduct import record_standing
 from masrel.lab.export import EXPORT_FORMS, export_study
@@ -288,14 +287,3 @@ def test_a_stop_leaves_no_folder(rated: Study, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         export_study(*rated, "bids", tmp_path / "x" / "out", progress=stop)
     assert list((tmp_path / "x").iterdir()) == []
-
-
-def test_what_is_wrong_is_said_in_one_sentence(rated: Study, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    with pytest.raises(ParameterError, match=r"form: needs one of bids, .*got 'xml'"):
-        export_study(*rated, "xml", out)
-    with pytest.raises(ParameterError, match=r"include: needs one of .* got 'who'"):
-        export_study(*rated, "bids", out, include=("who",))
-    with pytest.raises(ParameterError, match="needed a new or empty folder"):
-        export_study(*rated, "bids", rated[0].root)
-    assert not out.exists()

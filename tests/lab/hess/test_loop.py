@@ -33,7 +33,6 @@ from .rig import (
     controls,
     missing,
     present,
-    same_columns,
     scripted,
     stretching,
 )
@@ -419,15 +418,6 @@ def test_without_a_fault_it_ends_with_zero_torque_and_stays_open() -> None:
 
 
 # The result
-
-
-def test_the_same_presentation_twice_is_the_same_to_the_last_bit() -> None:
-    first, second = present("HM4", 73.0).recording, present("HM4", 73.0).recording
-    assert first.facts == second.facts
-    assert same_columns(first, second)
-    later = present("HM4", 73.0, clock=SimulatedClock(86_400_000_000_000)).recording
-    for name, column in first.columns.items():
-        np.testing.assert_allclose(later.columns[name], column, atol=1e-9)
 
 
 def test_with_a_real_clock_it_goes_the_same_way() -> None:

@@ -1,7 +1,7 @@
 """The simulated device: an arm that sticks, slides, stops, and a hand that moves it."""
 
 import time
-from math import pi, radians
+from math import radians
 
 import pytest
 
@@ -41,14 +41,6 @@ def test_the_end_stops_hold_the_arm_and_the_encoder_reads_multiples_of_its_step(
     assert flexed[-1] == pytest.approx(0.0, abs=radians(0.1))
     for angle in pushed + flexed:
         assert angle / STEP == pytest.approx(round(angle / STEP), abs=1e-6)
-
-
-@pytest.mark.parametrize("range_end", [0.9, 3.2])
-def test_an_arm_that_cannot_be_is_refused(range_end: float) -> None:
-    hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
-    assert not 1.0 < range_end <= pi
-    with pytest.raises(ParameterError, match="range_end"):
-        open_device("simulated", clock=SimulatedClock(), hand=hand, range_end=range_end)
 
 
 # Clocks

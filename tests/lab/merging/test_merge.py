@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.errors import MasrelError, ParameterError, ProtocolError, ScheduleError
+from masrel.errors import MasrelError, ParameterError, ScheduleError
 from masrel.lab.conduct import (
     Note,
     excluded_raters,
@@ -243,29 +243,6 @@ def refusal(sites: Sites, out: Path, kind: type[MasrelError]) -> str:
     assert not [p for p in out.parent.iterdir() if p.name.startswith(".masrel")]
     assert not out.exists()
     return str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            "residual_ratio = 0.15",
-            "residual_ratio = 0.2",
-            "models.HM1.residual_ratio: needed the same in all protocols, got 0.15 in "
-            "{0}/protocol.toml and 0.2 in {1}/protocol.toml",
-        ),
-        ("seed = 11", "seed = 12", "schedule.seed: needed the same"),
-        ('"Three models"', '"3 models"', "study.title: needed the same in all"),
-        ('id = "R1"\n', 'id = "R1"\nnote = "x"\n', "raters.R1.note: needed the same"),
-    ],
-)
-def test_another_key_is_refused_by_name(
-    new_study: NewStudy, tmp_path: Path, old: str, new: str, message: str
-) -> None:
-    north = StudyPaths(site(new_study, "north", "R1 R2"))
-    east = StudyPaths(site(new_study, "east", "R1 R5", (old, new)))
-    text = refusal((north, east), tmp_path / "both", ProtocolError)
-    assert text.startswith(message.format(north.root, east.root))
 
 
 def test_another_secret_is_refused(

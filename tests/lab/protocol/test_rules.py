@@ -278,12 +278,6 @@ def test_what_is_wrong_is_said_once(
         assert "(id " in said
 
 
-def test_sessions_that_come_after_each_other_are_all_refused(tmp_path: Path) -> None:
-    document = changed("sessions", 1, "after", to="test")
-    document["sessions"][0]["after"] = "retest"
-    assert len(problems_of(document, tmp_path)) == 2
-
-
 def test_a_date_stands_with_or_without_quotes(tmp_path: Path) -> None:
     path = write(with_values({"since": "2001-02-03"}), tmp_path)
     quoted = read_protocol(path)

@@ -190,20 +190,3 @@ def test_in_person_grades_are_text_and_may_be_missing(tmp_path: Path) -> None:
     assert (first.in_person_grade, first.haptic_grade) == ("1", "1+")
     assert (second.in_person_grade, second.haptic_grade) == (None, None)
     assert (second.line, second.note, second.subject) == (3, "absent", "1")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("rater,subject\nR1,1\n", "line 1: needed the columns source_table"),
-        (IN_PERSON + "IV,,1,HM1,1,1,\n", "line 2, column 'rater': needed text"),
-        (IN_PERSON + "IV,R1,1,HM1,1,1,\n" * 2, "line 3: .*line 2 has one already"),
-    ],
-)
-def test_a_bad_in_person_table_is_refused(
-    tmp_path: Path, text: str, message: str
-) -> None:
-    path = tmp_path / "in_person.csv"
-    path.write_text(text)
-    with pytest.raises(RatingsError, match=rf"in_person\.csv: {message}"):
-        read_in_person(path)

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import pytest
 
-from masrel.errors import ParameterError
 from masrel.lab.analysis import analyze
 from masrel.lab.conduct import (
     Note,
@@ -156,15 +155,6 @@ def test_a_report_of_before_the_last_event_is_found(
         assert late in message
         page(study, protocol)
         assert messages() == []
-
-
-def test_a_name_that_nothing_private_has_is_refused(
-    run_study: tuple[StudyPaths, Protocol],
-) -> None:
-    with pytest.raises(
-        ParameterError, match="needs one of who, notes, years, job, got 'x'"
-    ):
-        study_conduct(*run_study, include=["x"])
 
 
 def test_a_study_that_was_not_run_has_no_such_section(new_study: NewStudy) -> None:

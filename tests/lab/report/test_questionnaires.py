@@ -8,7 +8,6 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from masrel.errors import RatingsError
 from masrel.lab.analysis import QuestionSummary, analyze
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import (
@@ -180,18 +179,3 @@ def test_simulated_answers_are_labelled() -> None:
     simulated = replace(score(7), grades_from="simulated")
     assert answers_csv((simulated,)).startswith("# SIMULATED: not answers of persons.")
     assert "SIMULATED" not in answers_csv((score(7),))
-
-
-@pytest.mark.parametrize(
-    ("row", "problem"),
-    [
-        ("test,R1,realism,score,,,11,x", "answer: needed a whole number, 1 to 10, got"),
-        ("test,R1,realism,other,,,1,x", "question: needed one of realism.score, got"),
-        ("test,R1,realism,score,HM1,b,1,x", "repeat: needed a whole number, got 'b'"),
-    ],
-)
-def test_a_wrong_row_is_named(tmp_path: Path, row: str, problem: str) -> None:
-    file = tmp_path / "answers.csv"
-    file.write_text(answers_csv(()) + row + "\n", encoding="utf-8")
-    with pytest.raises(RatingsError, match=f"answers.csv: line 4: {problem}"):
-        read_answers(file, read_protocol(HESS.protocol))

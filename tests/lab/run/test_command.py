@@ -93,20 +93,6 @@ def test_simulated_sessions_become_a_table(small: Small) -> None:
     assert other.read_bytes() == first
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--correct", "X"], "run --correct is now masrel record correct"),
-        (["--grades", "oracle"], "oracle"),
-    ],
-)
-def test_a_call_that_makes_no_sense_is_refused(
-    small: Small, options: list[str], message: str
-) -> None:
-    _, err = typed("run", small[0].root, *R1, *options, code=2)
-    assert message in err
-
-
 def test_a_stop_and_a_fault_end_with_1_and_a_wrong_rater_with_2(
     faulty: Small, new_study: Callable[..., Small], masrel: Callable[..., Done]
 ) -> None:
@@ -174,36 +160,6 @@ def test_a_fault_is_skipped_later_and_its_grade_given_later_still(
     assert grades(faulty) == ["1+", None, None]
     assert len(study_remarks(study, protocol)) == 2
     assert not verify_study(study).findings
-
-
-def test_a_grade_is_corrected_to_missing_and_back_and_not_skipped(small: Small) -> None:
-    study, _ = small
-    run(small, ScriptGrades(["1", "2", "3"]))
-    first = codes(small)[0]
-    correct = ("record", "correct", study.root, *R1, "--code", first, *KIM)
-    said, _ = typed(*correct, "--grade", "NA")
-    assert f"{first} of R1, session test, is now missing" in said
-    assert grades(small) == [None, "2", "3"]
-    with pytest.raises(SessionLogError, match="needed a code that has a grade"):
-        record_correction(*small, "R1", "test", code=first, grade=None, **BY)
-    with pytest.raises(SessionLogError, match="needed a code that a fault stopped"):
-        record_skip(*small, "R1", "test", code=first, **BY)
-    assert not verify_study(study).findings
-    for _ in range(2):
-        said, _ = typed(*correct, "--grade", "4")
-        assert f"{first} of R1, session test, is now 4" in said
-    assert grades(small) == ["4", "2", "3"]
-
-
-def test_what_was_presented_and_graded_late_is_not_presented_again(
-    small: Small,
-) -> None:
-    with pytest.raises(RuntimeError, match="stopped on request"):
-        by_console(small, "\nstop\n")
-    record_correction(*small, "R1", "test", code=codes(small)[0], grade="2", **BY)
-    assert "Presentation 1 of 3" not in by_console(small, "\n1\n\n3\n")
-    assert grades(small) == ["2", "1", "3"]
-    assert not verify_study(small[0]).findings
 
 
 def test_a_grade_is_corrected_at_the_console_while_the_session_runs(

@@ -12,7 +12,6 @@ from masrel.errors import (
     ParameterError,
     RatingsError,
     ScheduleError,
-    SessionStoppedError,
 )
 from masrel.lab.conduct import (
     allot_schedules,
@@ -127,23 +126,6 @@ def test_it_opens_once_every_session_is_complete_or_closed(sealed: Sealed) -> No
     assert unseal_study(study, protocol, **BY) == 2
     kinds = [event.kind for event in read_conduct(study)]
     assert kinds == ["withdrawn", "unblinded"]
-
-
-def test_a_session_that_was_stopped_goes_on(sealed: Sealed) -> None:
-    study, _ = sealed
-
-    class Stopping(ScriptGrades):
-        def make_ready(self, request) -> None:
-            if request.presentation.position == 3:
-                raise SessionStoppedError("enough")
-
-    with pytest.raises(SessionStoppedError):
-        run_session(
-            *sealed, "R1", "test", grades=Stopping(["0", "1"]), clock="simulated"
-        )
-    run(sealed, "R1", ["0", "1", "2", "3"])
-    assert named_in(study) == []
-    assert verify_study(study).is_whole
 
 
 def test_without_its_secret_nobody_runs_or_opens_it(sealed: Sealed) -> None:

@@ -127,13 +127,6 @@ def test_the_draw_from_a_published_secret_is_what_the_rule_gives_by_hand() -> No
     assert drawn.commitment == commitment == VECTOR_COMMITMENT
 
 
-def test_a_secret_of_another_length_and_a_row_are_refused() -> None:
-    with pytest.raises(ScheduleError, match="secret: needed 16 bytes, got 3"):
-        draw_schedule(protocol_of(), "R1", "test", secret=b"abc")
-    with pytest.raises(ScheduleError, match="random-order has no rows, got 2"):
-        draw_schedule(protocol_of(), "R1", "test", row=2)
-
-
 def test_the_secret_is_drawn_once_and_is_in_no_other_file(tmp_path: Path) -> None:
     study = StudyPaths(tmp_path)
     write_schedules(protocol_of(raters=("R1",)), study)

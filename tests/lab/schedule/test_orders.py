@@ -220,49 +220,6 @@ def test_a_design_needs_a_row(scheme: str, row: int | None) -> None:
         draw_schedule(protocol_of(scheme=scheme), "R1", "test", row=row)
 
 
-RESTRICTED = {"seed": 1, "scheme": "restricted"}
-
-
-@pytest.mark.parametrize(
-    ("rules", "sentence"),
-    [
-        ({"seed": 1, "scheme": "wiliams"}, "did you mean williams?"),
-        (
-            {**RESTRICTED, "max_same_grade": 0},
-            "schedule.max_same_grade: needed a whole number at least 1, got 0",
-        ),
-        (
-            RESTRICTED,
-            "schedule.scheme: needed standards_apart = true or max_same_grade beside "
-            '"restricted", got neither',
-        ),
-        (
-            {**RESTRICTED, "standards_apart": True, "repeats": 2, "max_same_grade": 0},
-            "schedule.max_same_grade",
-        ),
-        (
-            {"seed": 1, "max_same_grade": 2},
-            'schedule.max_same_grade: needed with schedule.scheme = "restricted" only, '
-            'got it with "random-order"',
-        ),
-        (
-            {"seed": 1, "scheme": "williams", "blocks_by": "role"},
-            'schedule.blocks_by: needed with schedule.scheme = "blocks" only',
-        ),
-        (
-            {"seed": 1, "strata": "site"},
-            'raters[0].site: needed the id of a site with schedule.strata = "site", '
-            'got none (id "R1")',
-        ),
-    ],
-)
-def test_keys_that_do_not_go_together_are_refused_by_name(
-    tmp_path: Path, rules: dict[str, object], sentence: str
-) -> None:
-    first, *_ = problems_of(changed("schedule", to=rules), tmp_path)
-    assert sentence in first
-
-
 def of_models(
     rules: dict[str, object], *models: tuple[str, str, str | None]
 ) -> dict[str, object]:

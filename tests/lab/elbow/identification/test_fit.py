@@ -251,33 +251,6 @@ def test_recordings_without_a_stretch_are_left_out_or_refused() -> None:
         fit([idle])
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"level": 1.0}, "level: needs more than 0.5 and less than 1, got 1.0"),
-        ({"slow_below": -1.0}, "slow_below: needs more than 0"),
-        ({"inertia": "free"}, 'inertia: needs "zero" or "fitted"'),
-        ({"gravity": "on"}, 'gravity: needs "off", "fitted" or a number'),
-        ({"lag": -0.1}, "lag: needs 0 or more"),
-        ({"rise": 0.2}, "rise: needs 0 to ΔT_peak, 0.1 s, got 0.2 s"),
-        ({"gravity_angle": math.inf}, "gravity_angle: needs a finite angle"),
-        (
-            {"inertia": "fitted", "constants": replace(HM3, post_catch="additive")},
-            'inertia: with post_catch "additive"',
-        ),
-        (
-            {"constants": replace(HM3, residual_reading="decrease")},
-            "reads Q as section II does",
-        ),
-    ],
-)
-def test_options_outside_their_range_are_refused(
-    movements: list[Movement], options: dict[str, Any], said: str
-) -> None:
-    with pytest.raises(ParameterError, match=said):
-        fit(movements[:2], **options)
-
-
 # 5 studies of 8 parameters: at 95 % coverage 2 of 40 miss on average. Were they
 # independent, 8 or more would miss once in 1000 times. 200 studies: an interval of true
 # coverage 95 % is within 180 to 196 but once in 200 times; 10 studies: at least 7 but

@@ -164,18 +164,6 @@ def test_a_faulty_file_is_named_with_the_place(
     assert "trial.csv" in str(raised.value)
 
 
-def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="no such file"):
-        read_movement(tmp_path / "absent.csv")
-    for name, content, said in [
-        ("latin.csv", b"time_s,\xe9\n", "needed UTF-8 text, got the byte 0xe9"),
-        ("broken.npz", b"PK no archive", "not an archive of columns"),
-    ]:
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(RecordingError, match=said):
-            read_movement(tmp_path / name)
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [

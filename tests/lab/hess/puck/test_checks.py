@@ -105,11 +105,6 @@ def test_a_puck_that_is_well_passes_everything(
     assert checks[name].result.startswith(result)
 
 
-def test_a_bus_on_which_nobody_is_cannot_be_checked() -> None:
-    with pytest.raises(DeviceError, match="no answer for property 5"):
-        checked(wake_s=3.0)
-
-
 def test_probe_tells_what_it_can_drive_from_what_it_cannot() -> None:
     def report(**emulator) -> NodeReport:
         clock, hand = SimulatedClock(), stretching()
@@ -139,24 +134,6 @@ def test_probe_tells_what_it_can_drive_from_what_it_cannot() -> None:
 # A free arm turned by its motor
 
 TWO = (radians(60.0), radians(80.0))
-
-
-# A mirrored puck is the same to everybody: counts and torques change their signs
-# together, so that only a person who looks at the arm can tell (docs/hardware.md).
-@pytest.mark.parametrize(
-    ("start_deg", "options"), [(120.0, {}), (60.0, {"direction": -1})]
-)
-def test_a_free_arm_says_its_friction_from_wherever_it_starts(
-    start_deg: float, options: dict
-) -> None:
-    clock, hand = SimulatedClock(), loose(start_deg)
-    options = puck_options(hand, **options)
-    two = (radians(40.0), radians(80.0))
-    with open_device("puck", clock=clock, hand=hand, options=options) as device:
-        estimate = fit_friction(steady_runs(device, clock, speeds=two))
-    assert device.emulator.mode == 0
-    assert estimate.viscous == pytest.approx(0.168, rel=0.03)
-    assert estimate.coulomb == pytest.approx(0.189, rel=0.03)
 
 
 def simulated(clock: SimulatedClock, **faults) -> FaultyDevice:

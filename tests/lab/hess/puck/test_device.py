@@ -17,7 +17,7 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
-from masrel.lab.hess import BackendOptions, RealClock, SimulatedClock, open_device
+from masrel.lab.hess import RealClock, SimulatedClock, open_device
 from masrel.lab.hess.puck import (
     PropertyTable,
     PuckOptions,
@@ -228,21 +228,6 @@ def test_a_count_or_two_beside_the_angle_is_there(monkeypatch) -> None:
 
 
 # Options
-
-
-@pytest.mark.parametrize(
-    ("setup", "words"),
-    [
-        ({}, "puck: needs options that say on which bus it is"),
-        ({"options": BackendOptions()}, "of type PuckOptions, got BackendOptions"),
-        ({"options": PuckOptions()}, "needs a real clock"),
-        ({"options": PuckOptions(), "hand": loose()}, "got a hand alone"),
-        ({"options": puck_options(loose())}, "got an emulator alone"),
-    ],
-)
-def test_a_setup_that_contradicts_itself_is_refused(setup: dict, words: str) -> None:
-    with pytest.raises(DeviceError, match=words):
-        open_device("puck", clock=SimulatedClock(), **setup)
 
 
 @pytest.mark.parametrize("angle_deg", [-0.1, 180.1, float("nan")])
