@@ -75,16 +75,20 @@ def wait_for_presentation(study: StudyPaths) -> None:
 
 
 ONE = FREE.partition("[presentation]")[0]
+CUED = FREE.replace('"free"', '["slow", "fast"]\nslow_speed_deg_s = 40.0')
+FAST = "Stretch 2: fast, at least 120 deg/s (V3)"
 ASKED = "Stretch the arm as often as you want, then Enter says done"
 
 
 @pytest.mark.parametrize(
-    ("device", "asked", "typed", "then", "answer", "end"),
+    ("device", "asked", "typed", "shown", "answer", "end"),
     [
         # two Enters too many while it ends, and two where the grade is asked for
-        (FREE, ASKED, "\n*\n\n\n", "Grade of", "\n\n2\n", ("done", "2")),
-        (FREE, ASKED, "\n* ", "Present it again?", "no\n", "emergency stop: key"),
-        (ONE, "Enter to begin", "\n*\n", "Grade of", "2\n", ("arrived", "2")),
+        (FREE, ASKED, "\n*\n\n\n", ["Grade of"], "\n\n2\n", ("done", "2")),
+        (FREE, ASKED, "\n* ", ["Present it again?"], "no\n", "emergency stop: key"),
+        (ONE, "Enter to begin", "\n*\n", ["Grade of"], "2\n", ("arrived", "2")),
+        # the next cue is shown when a stretch is over
+        (CUED, "slow", "\n", [FAST, "Grade of"], "2\n", ("stretches", "2")),
     ],
 )
 def test_enter_says_done_and_every_other_key_is_an_emergency_stop(
@@ -92,7 +96,7 @@ def test_enter_says_done_and_every_other_key_is_an_emergency_stop(
     device: str,
     asked: str,
     typed: str,
-    then: str,
+    shown: list[str],
     answer: str,
     end: tuple[str, str] | str,
 ) -> None:
@@ -101,10 +105,11 @@ def test_enter_says_done_and_every_other_key_is_an_emergency_stop(
     with closing(Terminal(study)) as terminal:
         assert asked in terminal.read_until("stop to stop")
         terminal.type(typed)
-        terminal.read_until(then)
+        for words in shown:
+            terminal.read_until(words)
         terminal.type(answer)
-        shown = terminal.read_until("is complete") if end[0] != "e" else ""
-        assert "is not a grade" not in shown
+        said = terminal.read_until("is complete") if end[0] != "e" else ""
+        assert "is not a grade" not in said
         assert terminal.session.wait(60.0) == (end[0] == "e")
     log = read_log(study.log_file("R1", "test"))
     kinds = [event.kind for event in log]
