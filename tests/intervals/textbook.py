@@ -1,61 +1,34 @@
-"""Coefficients by their textbook formulas, in fractions, and all their resamples.
+"""Coefficients by their textbook formulas, in fractions, of all resamples.
 
 Nothing here is shared with the package: items are drawn one by one, n^n times.
 """
 
 import itertools
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from statistics import NormalDist
+
+from tests.accuracy import reference
 
 Row = Sequence[int | None]
 Table = Sequence[Row]
 Formula = Callable[[Table], Fraction | None]
 
 
-def _agreeing(row: Row) -> Fraction | None:
-    given = [grade for grade in row if grade is not None]
-    pairs = list(itertools.permutations(given, 2))
-    if not pairs:
-        return None
-    return Fraction(sum(a == b for a, b in pairs), len(pairs))
+ALIKE = reference.agreement("identity", range(3))
 
 
-def percent(table: Table) -> Fraction | None:
-    """Mean share of agreeing pairs of raters."""
-    shares = [share for row in table if (share := _agreeing(row)) is not None]
-    return sum(shares, Fraction(0)) / len(shares) if shares else None
+def formula(name: str) -> Formula:
+    """Return a coefficient of three categories, from its textbook."""
+
+    def value(table: Table) -> Fraction | None:
+        return reference.value(name, reference.items_of_ratings(table), ALIKE, 3)
+
+    return value
 
 
-def category_shares(table: Table, n_categories: int) -> list[Fraction]:
-    """Mean over items of the share of the item's raters who chose each category."""
-    found = [Fraction(0)] * n_categories
-    rated = [[grade for grade in row if grade is not None] for row in table]
-    rated = [row for row in rated if row]
-    for row in rated:
-        for k in range(n_categories):
-            found[k] += Fraction(row.count(k), len(row) * len(rated))
-    return found
-
-
-def fleiss(table: Table) -> Fraction | None:
-    """Fleiss (1971): (P - P_e) / (1 - P_e), P_e the sum of squared shares."""
-    observed = percent(table)
-    chance = sum(p * p for p in category_shares(table, 3))
-    if observed is None or chance == 1:
-        return None
-    return (observed - chance) / (1 - chance)
-
-
-def gwet(table: Table) -> Fraction | None:
-    """Gwet's AC1, three categories: P_e = Σ p (1 - p) / 2."""
-    observed = percent(table)
-    if observed is None:
-        return None
-    chance = sum(p * (1 - p) for p in category_shares(table, 3)) / 2
-    return (observed - chance) / (1 - chance)
+percent, fleiss, gwet = map(formula, ("percent_agreement", "fleiss_kappa", "gwet_ac"))
 
 
 class Law:
@@ -123,22 +96,8 @@ def bca_positions(
 
 
 def fleiss_error(table: Table) -> float:
-    """Root of the sum of squared influences of items on Fleiss' kappa, over n."""
-    value, observed = fleiss(table), percent(table)
-    assert value is not None
-    assert observed is not None
-    shares = category_shares(table, 3)
-    chance = sum(p * p for p in shares)
-    n = len(table)
-    total = Fraction(0)
-    for row in table:
-        given = [grade for grade in row if grade is not None]
-        agreeing = _agreeing(row)
-        assert agreeing is not None
-        moved = sum(
-            2 * shares[k] * (Fraction(given.count(k), len(given)) - shares[k])
-            for k in range(3)
-        )
-        # d kappa = (dP - (1 - kappa) dP_e) / (1 - P_e)
-        total += ((agreeing - observed - (1 - value) * moved) / (1 - chance)) ** 2
-    return math.sqrt(total) / n
+    """Root of the mean of squared influences of items on Fleiss' kappa."""
+    items = reference.items_of_ratings(table)
+    error = reference.standard_error("fleiss_kappa", items, ALIKE, 3)
+    assert error is not None
+    return float(error)
