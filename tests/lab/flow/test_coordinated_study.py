@@ -9,10 +9,7 @@ from typing import Any
 
 import pytest
 
-from docs.make.pages import read
-from masrel.lab.progress import study_status
-from masrel.lab.protocol import StudyPaths, read_protocol
-from tests.docs.test_pages import TEXTS, hold_page
+from tests.docs.test_pages import hold_page
 
 PAGE = "docs/coordinating.md"
 SCRIPT = Path(__file__).with_name("independent.py")
@@ -37,21 +34,9 @@ def logs(run: Path) -> Said:
     return dict(json.loads(done.stdout))
 
 
-@pytest.fixture(scope="module")
-def stands(run: Path) -> Said:
-    """What ``masrel status --json`` says."""
-    study = StudyPaths(run / "both")
-    return study_status(study, read_protocol(study.protocol))
-
-
 def rows(file: Path) -> list[dict[str, str]]:
     lines = file.read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
-
-
-def test_the_page_has_no_more_than_forty_commands() -> None:
-    lines = [line for block in read(TEXTS[PAGE]) for line in block.lines]
-    assert sum(line.startswith("$ ") for line in lines) <= 40
 
 
 def test_ratings_are_those_in_force_by_the_logs(run: Path, logs: Said) -> None:
@@ -69,47 +54,6 @@ def test_ratings_are_those_in_force_by_the_logs(run: Path, logs: Said) -> None:
     second = {name: each["second"] for name, each in logs["sessions"].items()}
     twice = {name: of for name, of in second.items() if of != [0, []]}
     assert twice == {"test_R1": [6, []]}  # settled by the correction
-
-
-def test_days_and_raters_are_those_of_the_logs(
-    run: Path, logs: Said, stands: Said
-) -> None:
-    held = {
-        f"{each['session']}_{each['rater']}": each["held_on"]
-        for each in stands["sessions"]
-        if each["held_on"]
-    }
-    assert held == {name: each["day"] for name, each in logs["sessions"].items()}
-    assert (held["test_R1"], held["retest_R1"]) == ("2026-05-04", "2026-05-13")
-    table = rows(run / "both/ratings/raters.csv")
-    late = ["yes" if each["is_late"] else "no" for each in stands["raters"]]
-    assert [(r["late"], r["status"]) for r in table] == [
-        *zip(late, (each["status"] for each in stands["raters"]), strict=True)
-    ]
-    assert [r["rater"] for r in table if r["late"] == "yes"] == logs["late"] == ["R5"]
-    left = [r["rater"] for r in table if r["status"] == "withdrawn"]
-    assert (left, logs["excluded"]) == ([*logs["withdrawn"]], [])
-
-
-def test_what_happened_is_that_of_the_logs(run: Path, logs: Said, stands: Said) -> None:
-    events = {each["event"]: dict(each) for each in stands["events"]}
-    assert logs["withdrawn"] == {"R2": events["withdrawn"]["on"]}
-    (adverse,) = logs["adverse"]
-    assert adverse | events["noted"] == events["noted"] | {"day": adverse["day"]}
-    report = " ".join((run / "both/report/report.md").read_text("utf-8").split())
-    assert f"relatedness: possible; onset: {adverse['onset']}" in report
-    assert "| 2026-05-27 | withdrawn | R2 |" in report
-    assert "the session was held on 2026-05-13, as was corrected on" in report
-
-
-def test_the_plan_and_its_change_are_those_of_the_logs(
-    run: Path, logs: Said, stands: Said
-) -> None:
-    registered = json.loads((run / "registration.json").read_text(encoding="utf-8"))
-    assert registered["protocol"] == logs["plan"]  # that of the first draw
-    (change,) = stands["plan_changes"]
-    named = [change["key"], *map(json.loads, (change["before"], change["after"]))]
-    assert logs["changes"] == [[[*named, change["time_utc"][:10]]]] * 2  # at both sites
 
 
 def test_kappa_is_that_of_the_logs(run: Path, logs: Said) -> None:
