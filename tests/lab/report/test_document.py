@@ -12,7 +12,6 @@ from tests.lab.report.pages import (
     Page,
     markdown_tables,
     page_of,
-    published_report,
 )
 
 
@@ -194,20 +193,6 @@ def _is_shown_as(value: str, cell: str) -> bool:
         return True
     digits = len(cell.partition(".")[2])
     return abs(float(cell.replace("−", "-")) - float(value)) <= 0.5000001 * 10**-digits
-
-
-def test_only_the_sections_that_a_protocol_names_are_there(tmp_path: Path) -> None:
-    files = published_report(tmp_path, "speeds", "intended")
-    _, *sections = page_of(files).headings
-    titles = ["Agreement with the intended grade", "Stretching speeds", "Provenance"]
-    assert sections == titles
-    assert {path.stem for path in files.tables} == {
-        "speeds_by_model",
-        "speeds_by_rater",
-        "intended",
-    }
-    figures = {(path.stem, path.suffix) for path in files.figures}
-    assert figures == {("speeds", ".png"), ("speeds", ".svg")}
 
 
 def test_the_inputs_are_named_and_symbols_have_their_index_set_low(

@@ -14,10 +14,9 @@ from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import PlannedEstimate, analyze
 from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.lab.report import ReportFiles, write_report
-from masrel.lab.report._material import estimate_titles
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.analysis.studies import of_session, plan, protocol_with, ratings, table_v
-from tests.lab.report.pages import AGAIN, simulated_ratings
+from tests.lab.report.pages import AGAIN, rows_of, simulated_ratings, written
 
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 
@@ -37,24 +36,6 @@ def result_of(rows: Ratings, folder: Path, *lines: Any, **of: Any) -> str:
     protocol = protocol_with(*lines, sections=("intended",))
     analysis = analyze(protocol, rows, **of)
     return paragraph(write_report(protocol, rows, analysis, folder))
-
-
-def test_the_published_result_is_told_in_sentences(tmp_path: Path) -> None:
-    lines = (
-        plan(id="kappa", interval="jackknife"),
-        plan(id="items", interval="posterior", target="items"),
-        AGAIN,
-    )
-    text = result_of(table_v(), tmp_path, *lines)
-    assert text == (
-        "In session test, 8 raters graded 4 standard models (32 grades, none missing): "
-        "Fleiss' κ was 0.626 (95 % confidence interval 0.320 to 0.933, for other "
-        "raters like these on the same models). For these raters on other models like "
-        "these, its 95 % credible interval is 0.370 to 0.874. On average over the 4 "
-        "standard models, 84.4 % of the grades were as intended. Agreement of raters "
-        "with themselves could not be estimated: there are no ratings of session "
-        "retest."
-    )
 
 
 ONE = ratings(*of_session("test", R1=("1",), R2=("1",)))
@@ -145,22 +126,6 @@ def shown(
         return cells, list(csv.DictReader(file)), text
 
 
-def test_the_csv_has_every_number_and_the_page_one_interval(tmp_path: Path) -> None:
-    (head, row, *full), (cells,), text = shown(tmp_path, one(interval=interval()))
-    assert head == ["Estimate", "Value", "Interval", "Models", "Raters"]
-    assert row == ["Fleiss' κ, standard models", "0.626", "[0.320, 0.933]", "4", "8"]
-    assert [cells[: len(head)] for cells in full] == [head, row]
-    assert full[0][len(head) :] == ["At least", "p_o", "p_e"]
-    assert full[1][len(head) :] == ["fair", "0.723", "0.260"]
-    assert "Intervals of 95 %: confidence for other raters." in text
-    expected = {"value": "0.626083678854127", "low": "0.31957", "high": "0.93252"}
-    expected |= {"interval": "95 % confidence, jackknife, t(7)", "n_items": "4"}
-    expected |= {"target": "other raters", "n_raters": "8", "models": "standard"}
-    expected |= {"id": "kappa", "title": row[0], "coefficient": "Fleiss' κ"}
-    assert {key: cells[key] for key in expected} == expected
-    assert "interval_shown" not in cells
-
-
 def test_intervals_made_alike_share_a_meaning_and_wide_ones_are_not_shown(
     tmp_path: Path,
 ) -> None:
@@ -187,13 +152,17 @@ def test_intervals_made_alike_share_a_meaning_and_wide_ones_are_not_shown(
     assert text.count("with probability 99.9 %") == 1
 
 
-def test_an_estimate_has_a_title_of_its_own_or_one_that_no_other_has() -> None:
+def test_an_estimate_has_a_title_of_its_own_or_one_that_no_other_has(
+    tmp_path: Path,
+) -> None:
     lines = [
         plan(id="a"), plan(id="b", target="items"), plan(id="c", target="items"),
         plan(id="d", title="My κ"), plan(id="e", models="dummy"), AGAIN,
     ]  # fmt: skip
+    protocol = protocol_with(*lines, sections=("agreement", "test-retest"))
+    files = written(tmp_path, protocol, table_v())
     kappa = "Fleiss' κ, standard models, other"
-    assert list(estimate_titles(lines).values()) == [
+    assert [row["title"] for row in rows_of(files, "agreement")] == [
         f"{kappa} raters", f"{kappa} models, b", f"{kappa} models, c", "My κ",
         "Fleiss' κ, dummy models", "Stratified κ, standard models, retest",
     ]  # fmt: skip

@@ -12,7 +12,6 @@ from masrel.lab.analysis import QuestionSummary, analyze
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import (
     GivenAnswer,
-    answers_csv,
     read_answers,
     read_study_data,
     write_answers,
@@ -173,9 +172,3 @@ def test_answers_are_read_as_they_were_written(
     write_answers(answers, file)
     assert "'=1+1" in file.read_text(encoding="utf-8")
     assert read_answers(file, asking) == answers
-
-
-def test_simulated_answers_are_labelled() -> None:
-    simulated = replace(score(7), grades_from="simulated")
-    assert answers_csv((simulated,)).startswith("# SIMULATED: not answers of persons.")
-    assert "SIMULATED" not in answers_csv((score(7),))
