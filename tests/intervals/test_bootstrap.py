@@ -162,7 +162,13 @@ def drawn(
         chance = sum(both, Fraction(0)) / len(both) if both else Fraction(1)
     else:
         n = len(shares_of_items)
-        chance = sum((sum(of) / n) ** 2 for of in zip(*shares_of_items, strict=True))
+        p = [sum(of, Fraction(0)) / n for of in zip(*shares_of_items, strict=True)]
+        chance = {
+            "percent_agreement": Fraction(0),
+            "fleiss_kappa": p[0] ** 2 + p[1] ** 2,
+            "brennan_prediger": Fraction(1, 2),
+            "gwet_ac": 2 * p[0] * p[1],
+        }[name]
     if chance == 1:
         return None
     return (observed / n_items - chance) / (1 - chance)
@@ -182,7 +188,7 @@ def law(name: str, table: list[Row], *, items: bool) -> dict[Fraction, Fraction]
 
 
 @pytest.mark.parametrize("table", [COMPLETE, HOLED], ids=["complete", "holed"])
-@pytest.mark.parametrize("name", ["fleiss_kappa", "conger_kappa"])
+@pytest.mark.parametrize("name", [*FORMULAS, "brennan_prediger", "conger_kappa"])
 @pytest.mark.parametrize("target", ["raters", "both"])
 def test_the_law_is_that_of_every_draw(
     name: str, table: list[Row], target: str

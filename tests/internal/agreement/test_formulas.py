@@ -1,11 +1,7 @@
-"""Formulas: slopes by a complex step, and sums over resampled raters pair by pair."""
-
-from collections.abc import Sequence
-from itertools import product
+"""Formulas: slopes by a complex step."""
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from masrel.agreement import COEFFICIENTS, WeightName, coefficient, declared_weights
 
@@ -55,57 +51,3 @@ POOLED = [  # the shares of Conger's raters are each rater's own
     for name, entry in COEFFICIENTS.items()
     if entry.formula and entry.formula.resampled and name != "conger_kappa"
 ]
-
-
-def by_pairs(
-    taken: Sequence[int], v: NDArray[np.float64]
-) -> tuple[float, NDArray[np.float64]] | None:
-    """Return D_o and the shares of the categories, rating by rating."""
-    disagreement, shares = [], []
-    for row in CODES.tolist():
-        ratings = [(rater, row[rater]) for rater in taken if row[rater] >= 0]
-        pairs = [
-            v[k, other]
-            for (g, k), (h, other) in product(ratings, ratings)
-            if g != h  # a rater is no witness of its copies
-        ]
-        if pairs:
-            disagreement.append(np.mean(pairs))
-        if ratings:
-            share = np.bincount([k for _, k in ratings], minlength=3)
-            shares.append(share / share.sum())
-    if not disagreement:
-        return None
-    return float(np.mean(disagreement)), np.mean(shares, axis=0)
-
-
-@pytest.mark.parametrize("weights", ["identity", "quadratic"])
-@pytest.mark.parametrize("name", POOLED)
-def test_of_resampled_raters_only_items_that_one_of_them_rated_count(
-    name: str, weights: WeightName
-) -> None:
-    formula = FORMULAS[name]
-    assert formula is not None
-    assert formula.resampled is not None
-    v = declared_weights(weights, [1, 2, 4]).v
-    once = np.ones(len(CODES), dtype=np.int64)
-    of_both, of_raters = formula.resampled(CODES, v), formula.resampled(CODES, v, once)
-    chance = {
-        "percent_agreement": lambda _: 1.0,
-        "fleiss_kappa": lambda p: p @ v @ p,
-        "brennan_prediger": lambda _: v.mean(),
-        "gwet_ac": lambda p: 1 - (9 - v.sum()) / 6 * (p * (1 - p)).sum(),
-    }[name]
-    n_defined = 0
-    for taken in product(range(3), repeat=3):
-        raters = np.bincount(taken, minlength=3)[None].astype(np.float64)
-        sums = of_both(once[None].astype(np.float64), raters)
-        assert of_raters(sums, raters) == pytest.approx(sums, rel=1e-12)
-        value = float(formula.value(sums, v)[0])
-        parts = by_pairs(taken, v)
-        if parts is None:
-            assert np.isnan(value)
-            continue
-        n_defined += 1
-        assert value == pytest.approx(1 - parts[0] / chance(parts[1]), rel=1e-12)
-    assert n_defined == 24  # all but those that take one rater three times
