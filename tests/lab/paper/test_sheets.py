@@ -1,12 +1,9 @@
 """Printed sheets: what stands on them, what does not, and where they are cut."""
 
 import re
-import shutil
-import subprocess
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 
@@ -15,6 +12,7 @@ from masrel.lab.paper import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import read_schedule, write_schedules
 from tests.lab.paper.conftest import QUESTIONS
+from tests.lab.report.test_in_chromium import CHROMIUM, WORDS, printed
 
 Small = tuple[StudyPaths, Protocol]
 New = Callable[..., Small]
@@ -143,8 +141,6 @@ def test_sheets_are_of_the_schedules_that_are_drawn(new_study: New) -> None:
         write_sheets(study, protocol, raters=["R2"])
 
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-WORDS = shutil.which("pdftotext")
 TALL = """
 [[questionnaires]]
 id = "{0}"
@@ -158,35 +154,6 @@ type = "visual-analogue"
 high_label = "ends-here"
 
 """
-XHTML = "{http://www.w3.org/1999/xhtml}"
-
-
-def printed(page: Path, folder: Path) -> list[list[ElementTree.Element]]:
-    """The words of each page of a PDF that Chromium prints, and their places."""
-    assert CHROMIUM is not None
-    assert WORDS is not None
-    pdf, words = folder / "sheets.pdf", folder / "words.html"
-    options = [
-        *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"),
-        *("--disable-background-networking", "--disable-component-update"),
-        *("--disable-sync", f"--user-data-dir={folder / 'profile'}"),
-        *("--no-pdf-header-footer", f"--print-to-pdf={pdf}"),
-    ]
-    call = [CHROMIUM, *options, page.as_uri()]
-    subprocess.run(call, check=True, capture_output=True, timeout=120)
-    subprocess.run([WORDS, "-bbox", str(pdf), str(words)], check=True)
-    pages = ElementTree.parse(words).iter(f"{XHTML}page")
-    found = []
-    for each in pages:
-        width, height = float(each.attrib["width"]), float(each.attrib["height"])
-        of_page = list(each.iter(f"{XHTML}word"))
-        for word in of_page:  # nothing reaches into the margin
-            assert 28 < float(word.attrib["xMin"]), word.text
-            assert float(word.attrib["xMax"]) < width - 28, word.text
-            assert 28 < float(word.attrib["yMin"]), word.text
-            assert float(word.attrib["yMax"]) < height - 28, word.text
-        found.append(of_page)
-    return found
 
 
 @pytest.mark.slow
@@ -200,7 +167,12 @@ def test_in_chromiums_pdf_no_row_is_split_and_no_code_is_missing(
     study, _ = new_study(("[schedule]", f"{tall}[schedule]\nrepeats = {repeats}"))
     protocol = read_protocol(study.protocol)
     made = write_sheets(study, protocol)
-    pages = [[str(word.text) for word in page] for page in printed(made.html, tmp_path)]
+    sheets = printed(made.html, tmp_path)
+    for word in (word for sheet in sheets for word in sheet):
+        # nothing reaches into the margin of A4, pt
+        assert 28 < word.left < word.right < 595 - 28, word
+        assert 28 < word.top < word.bottom < 842 - 28, word
+    pages = [[word.text for word in sheet] for sheet in sheets]
     if repeats == 1:  # a page a session
         assert len(pages) == 3
     else:
