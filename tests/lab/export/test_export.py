@@ -19,7 +19,7 @@ from masrel.lab.analysis import analyze, as_analysis_document
 from masrel.lab.conduct import record_standing
 from masrel.lab.export import EXPORT_FORMS, export_study
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.ratings import RATING_COLUMNS, read_study_data
+from masrel.lab.ratings import read_study_data
 from masrel.lab.recording import RECORDING_COLUMNS, read_recording
 from masrel.lab.report import study_conduct, write_report
 from masrel.lab.run import ScriptGrades, record_correction, run_session
@@ -202,23 +202,6 @@ def test_a_recording_of_bids_has_every_sample_to_the_last_bit(
         recording = read_recording(folder / f"{code}.npz")
         for place, name in enumerate(facts["Columns"]):
             np.testing.assert_array_equal(rows[:, place], recording.columns[name])
-
-
-def test_tables_of_bids_are_described_and_hold_what_is_public(bids: Path) -> None:
-    lines = (bids / "participants.tsv").read_text().splitlines()
-    assert [line.split("\t") for line in lines] == [
-        ["participant_id", "rater", "site", "status", "late", "years"],
-        ["sub-R1", "R1", "n/a", "begun", "no", "n/a"],
-        ["sub-R2", "R2", "n/a", "complete", "no", "7"],
-    ]
-    described = json.loads((bids / "participants.json").read_text())
-    assert described["years"] == {"Description": "Years of practice", "Units": "a"}
-    described = json.loads((bids / "task-MAS_beh.json").read_text())
-    assert {*described} - {"TaskName"} == set(RATING_COLUMNS)
-    assert list(described["grade"]["Levels"]) == ["0", "1", "1+", "2", "3", "4"]
-    with (bids / "sourcedata/ratings/answers.csv").open(newline="") as file:
-        answers = [(row["question"], row["answer"]) for row in csv.DictReader(file)]
-    assert answers == [("real", "7")] * 6
 
 
 def test_an_answer_of_two_lines_keeps_both(rated: Study, tmp_path: Path) -> None:

@@ -29,8 +29,6 @@ from masrel.lab.recording import (
     MEASURED_TORQUE,
     RECORDING_COLUMNS,
     Channel,
-    read_recording,
-    write_recording,
 )
 
 from .rig import START, ScriptedDevice, present, same_columns, scripted
@@ -252,15 +250,6 @@ def test_a_sensor_changes_no_torque_and_its_noise_is_that_of_the_seed() -> None:
     )
     assert sensed.columns[MEASURED].tobytes() == same.tobytes()
     assert (other != same).mean() > 0.5
-
-
-def test_channels_of_any_name_and_unit_are_written_and_read(tmp_path: Path) -> None:
-    made = stretched(lambda time_s: (time_s, float(time_s > 0.3)), EMG, KEY)
-    write_recording(made.recording, tmp_path / "a.npz")
-    back = read_recording(tmp_path / "a.npz")
-    assert back.channels == (EMG, KEY)
-    assert back.columns["emg_biceps_mv"].tolist() == back.columns["time_s"].tolist()
-    assert set(back.columns["key"]) == {0.0, 1.0}
 
 
 # What fails

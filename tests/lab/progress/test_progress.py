@@ -1,7 +1,6 @@
 """Where a study stands follows from its logs, and no model is named."""
 
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from masrel.lab.progress import (
     raters_csv,
     session_progress,
 )
-from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.run import ScriptGrades, record_correction, run_session
 from masrel.lab.schedule import read_schedule, write_schedules
 
@@ -95,56 +94,6 @@ def test_a_line_that_a_kill_cut_off_hides_nothing(small: Small) -> None:
     record_note(study, protocol, Note(text="power cut", who="MK"))
     assert status(small)["R2"] == "withdrawn"
     assert "note: text power cut" in call("status", study.root)
-
-
-@pytest.mark.parametrize(
-    ("steps", "late"),
-    [
-        ("", ""),
-        ("join R3", "R3"),
-        ("join R3 R4 R5", "R3 R4 R5"),  # more than began
-        ("join R3 R4 R5; reword", "R3 R4 R5"),
-        ("join R3; join R4 R5 R6", "R3 R4 R5 R6"),
-        ("join R3; join R4 R5 R6; reword", "R3 R4 R5 R6"),
-        ("reword; join R3", "R3"),
-        ("put first R3", "R3"),
-        ("put first R3 R4 R5", "R3 R4 R5"),
-        # when the protocol has changed since, sessions say which draw was before which
-        ("run R1; put first R3 R4 R5; run R3; reword", "R3 R4 R5"),
-        ("put first R3 R4 R5; run R3; run R1; reword", "R3 R4 R5"),
-        ("join R3; run R3; reword", "R3"),  # and here they do not
-        ("reword; run R1; reword; run R2", ""),
-        ("join R3 in south", ""),  # the first draw of its site
-        ("join R3 in south; join R4 R5 in south; reword", "R4 R5"),
-    ],
-)
-def test_who_joins_after_the_first_draw_is_late(
-    small: Small, steps: str, late: str
-) -> None:
-    study, _ = small
-    for step in filter(None, steps.split("; ")):
-        text = study.protocol.read_text(encoding="utf-8")
-        words, _, site = step.partition(" in ")
-        act, *raters = words.removeprefix("put ").split()
-        if act == "run":
-            run((study, read_protocol(study.protocol)), *raters)
-            continue
-        if act == "reword":
-            text = text.replace('title = "', 'title = "Another ')
-        named = ", ".join(f'"{rater}"' for rater in raters)
-        if act == "first":
-            text = text.replace("raters = [", f"raters = [{named}, ", 1)
-        if act == "join":
-            text = re.sub(r'(raters = \["R1", "R2"[^]]*)', rf"\1, {named}", text)
-        of_site = f'site = "{site}"\n' if site else ""
-        entries = [f'[[raters]]\nid = "{rater}"\n{of_site}\n' for rater in raters]
-        text = text.replace("[schedule]", "".join(entries) + "[schedule]")
-        study.protocol.write_text(text, encoding="utf-8")
-        if raters:
-            write_schedules(read_protocol(study.protocol), study)
-    protocol = read_protocol(study.protocol)
-    raters = rater_progress(study, protocol, session_progress(study, protocol))
-    assert [rater.rater for rater in raters if rater.is_late] == late.split()
 
 
 def test_the_next_step_is_one_command(small: Small) -> None:

@@ -2,7 +2,6 @@
 
 import csv
 from fractions import Fraction
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -43,20 +42,6 @@ def four(model: Model) -> tuple[Fraction, ...]:
         model.catch_travel_deg,
     )
     return tuple(Fraction(str(value)) for value in values)  # the decimals as written
-
-
-def test_dummies_are_fifths_of_the_way_between_neighbouring_standards(
-    protocol: Protocol,
-) -> None:
-    standards = [four(m) for m in protocol.models if m.role == "standard"]
-    dummies = [m for m in protocol.models if m.role == "dummy"]
-    assert [m.id for m in dummies] == [f"D{number:02d}" for number in range(1, 13)]
-    assert [m.intended_grade for m in dummies] == [None] * 12
-    assert [four(m) for m in dummies] == [
-        tuple(a + Fraction(k, 5) * (b - a) for a, b in zip(low, high, strict=True))
-        for low, high in pairwise(standards)
-        for k in (1, 2, 3, 4)
-    ]
 
 
 def test_the_published_ratings_are_table_v_cell_by_cell() -> None:

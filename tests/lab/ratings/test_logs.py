@@ -14,7 +14,6 @@ from masrel.lab.run import (
     ConsoleGrades,
     ScriptGrades,
     SessionLog,
-    read_log,
     record_correction,
     run_session,
 )
@@ -30,29 +29,6 @@ def graded(
     study: Small, *grades: str, rater: str = "R1", session: str = "test"
 ) -> None:
     run_session(*study, rater, session, grades=ScriptGrades(grades), clock="simulated")
-
-
-def test_sessions_come_in_the_protocols_order_with_their_speeds(small: Small) -> None:
-    study, protocol = small
-    with pytest.raises(RatingsError, match="needed a session log, got none"):
-        ratings_from_logs(study, protocol)
-    graded(small, "3", "3", "3", session="retest")
-    graded(small, "2", "2", "2", rater="R2")
-    graded(small, "1", "1+", "1")
-    table = ratings_from_logs(study, protocol).table
-    keys = list(dict.fromkeys(zip(table["session"], table["rater"], strict=True)))
-    assert keys == [("test", "R1"), ("test", "R2"), ("retest", "R1")]
-    shown = read_schedule(study.schedule_file("R1", "test")).presentations
-    first = table[:3]
-    assert first["model"].tolist() == [each.model for each in shown]
-    assert first["grade"].tolist() == ["1", "1+", "1"]
-    logged = [
-        event.fields["mean_speed_deg_s"]
-        for event in read_log(study.log_file("R1", "test"))
-        if event.kind == "presented"
-    ]
-    assert first["mean_speed_deg_s"].tolist() == logged
-    assert set(table["source"]) == {"simulated"}
 
 
 def test_a_session_that_has_begun_has_a_row_for_every_model(small: Small) -> None:

@@ -183,11 +183,6 @@ def test_what_is_no_table_is_said_clearly(
         read(tmp_path, text)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RatingsError, match=r"gone\.csv: no such file"):
-        read_study_ratings(tmp_path / "gone.csv", MODIFIED_ASHWORTH)
-
-
 @pytest.mark.parametrize("grade", ["1", "NA"])
 def test_a_duplicate_names_both_lines(tmp_path: Path, grade: str) -> None:
     twice = r"line 6, column 'grade'.*line 2 has one already"

@@ -213,13 +213,6 @@ def test_repeats_are_numbered_as_they_come(rules: dict[str, object]) -> None:
         assert repeats == [1, 2, 3, 4]
 
 
-@pytest.mark.parametrize("scheme", ["williams", "latin-square"])
-@pytest.mark.parametrize("row", [None, 0, -1])
-def test_a_design_needs_a_row(scheme: str, row: int | None) -> None:
-    with pytest.raises(ScheduleError, match="row: needed a row of the design, from 1"):
-        draw_schedule(protocol_of(scheme=scheme), "R1", "test", row=row)
-
-
 def of_models(
     rules: dict[str, object], *models: tuple[str, str, str | None]
 ) -> dict[str, object]:

@@ -15,8 +15,6 @@ from tests.lab.hess.puck.rig import (
     Bench,
     PuckNode,
     bench,
-    loose,
-    n_memory_writes,
     open_link,
     release,
 )
@@ -120,25 +118,6 @@ def test_it_holds_its_last_torque_for_ever_but_not_idle(on) -> None:
     torque = one.emulator.motor.plant.motor_torque
     assert torque == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
     assert angle_deg(one) > 145.9
-
-
-def test_its_own_limit_clips_and_writes_of_its_memory_are_counted(on) -> None:
-    one = told(on(awake=True), (MT, 100), (MODE, 2), (T, 8000))
-    assert one.node.get(T) == 100
-    assert told(one, (T, -8000)).node.get(T) == -100
-    told(one, *((number, -1) for number in (30, 31, 32)))
-    assert n_memory_writes(one.emulator) == 3  # SAVE, LOAD, DEF
-
-
-def test_idle_it_brakes(on) -> None:
-    def coasted_deg(*settings: tuple[int, int]) -> float:
-        one = told(on(awake=True, hand=loose(45.0)), (MODE, 2), (T, 288), wait_s=0.1)
-        here = angle_deg(told(one, *settings))
-        one.node.wait(0.3)
-        return angle_deg(one) - here
-
-    # 0.06 kg·m² against B = 0.168 and β = 0.189, with or without 1 N·m·s/rad more
-    assert 0.0 < coasted_deg((T, 0), (MODE, 0)) < 0.3 * coasted_deg((T, 0))
 
 
 def test_the_babbling_of_others_is_bounded(on) -> None:
