@@ -5,7 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from masrel.cli import cli
 from masrel.errors import MasrelError, ParameterError, ScheduleError
 from masrel.lab.conduct import (
     Note,
@@ -257,3 +259,40 @@ def test_a_full_disk_leaves_nothing(
     with pytest.raises(OSError, match="No space left"):
         merge_studies(sites, tmp_path / "both")
     assert not [p for p in tmp_path.iterdir() if p.name.startswith(".masrel")]
+
+
+def test_what_is_merged_is_its_owners_alone(
+    sites: Sites, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for study in sites:
+        note = Note(text="ill", who="MK", rater="R2")
+        record_note(study, read_protocol(study.protocol), note)
+    for path in sites[0].root.rglob("*"):  # as after a copy from elsewhere
+        path.chmod(0o777 if path.is_dir() else 0o666)
+    ever_open, original = [], os.write
+
+    def write(descriptor: int, data: bytes | memoryview) -> int:
+        ever_open.append(os.fstat(descriptor).st_mode & 0o077)
+        return original(descriptor, data)
+
+    monkeypatch.setattr(os, "write", write)
+    umask = os.umask(0)
+    try:
+        merged = merge_studies(sites, tmp_path / "both")
+    finally:
+        os.umask(umask)
+    modes = {path: path.stat().st_mode & 0o777 for path in merged.root.rglob("*")}
+    assert set(modes.values()) == {0o600, 0o700}
+    assert {modes[path] for path in merged.conduct_logs()} == {0o600}
+    assert modes[merged.merged_conduct] == 0o700
+    assert set(ever_open) == {0}  # nor while they are written
+    log = merged.merged_conduct / "north.jsonl"
+    said = []
+    for mode in (0o600, 0o644):
+        log.chmod(mode)
+        shown = CliRunner().invoke(cli, ["check", str(merged.root)]).output
+        said.append([line for line in shown.splitlines() if "chmod" in line])
+    assert said[0] == []
+    (note,) = said[1]
+    assert f"{log}: " in note
+    assert f"chmod 600 {log}" in note

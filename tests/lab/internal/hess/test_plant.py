@@ -170,9 +170,6 @@ def test_its_noise_and_its_steps_are_those_stated() -> None:
     assert abs(torques.mean()) < 4.0 * 0.02 / math.sqrt(4000.0)
 
 
-# The backdrivability test of Fig. 8: the torque a hand feels on the bare device
-
-
 # Whether the rendered joint can feed energy into a hand: the numbers of the page
 
 PERIOD = 0.001

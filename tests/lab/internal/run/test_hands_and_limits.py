@@ -6,6 +6,8 @@ import json
 import math
 from collections.abc import Callable
 from math import radians
+from pathlib import Path
+from random import Random
 
 import msgspec
 import numpy as np
@@ -25,16 +27,20 @@ from masrel.lab.protocol import (
     Protocol,
     SimulatedRaters,
     StudyPaths,
+    copy_template,
     joint_model,
+    read_protocol,
 )
 from masrel.lab.recording import RECORDING_COLUMNS, Recording, stretches
 from masrel.lab.run import GradeRequest, SimulatedGrades
 from masrel.lab.run._present import _felt
 from masrel.lab.run._settings import (
+    _largest_torque,
     backend_options,
     check_backend,
     device_limits,
     has_simulated_hand,
+    model_controller,
     moves_hardware,
 )
 from masrel.lab.run._simulated_raters import intended_speeds
@@ -168,6 +174,39 @@ def test_what_is_simulated(
 ) -> None:
     assert has_simulated_hand(settings) == by_simulated_hand
     assert moves_hardware(settings) == hardware
+
+
+def largest_command(protocol: Protocol, model: str, speed: float, end: float) -> float:
+    # of random movements to and fro, each with minimum jerk, up to a speed
+    random, controller = Random(3), model_controller(protocol, model)
+    start, time_s = radians(protocol.stretch.start_deg), 0.0
+    at, commands = start, []
+    for _ in range(8):
+        way = random.choice([start, end, random.uniform(start, end)]) - at
+        duration = max(1.875 * abs(way) / (speed * random.choice([0.4, 1.0])), 0.01)
+        for tick in range(int(duration * 1000)):
+            s = tick / (duration * 1000)
+            angle = at + way * (10 * s**3 - 15 * s**4 + 6 * s**5)
+            velocity = way / duration * 30 * (s * (1 - s)) ** 2
+            commands.append(abs(controller.step(time_s, angle, velocity)))
+            time_s += 0.001
+        at += way
+    return max(commands)
+
+
+@pytest.mark.parametrize("study", ["small", "tone"])
+def test_no_command_passes_what_the_limits_are_held_against(
+    study: str, tmp_path: Path
+) -> None:
+    copy_template(study, tmp_path)
+    protocol = read_protocol(tmp_path / "protocol.toml")
+    device = msgspec.structs.replace(protocol.device, friction_coulomb_nm=1.0)
+    protocol = msgspec.structs.replace(protocol, device=device)
+    for model in protocol.models:
+        if not model_controller(protocol, model.id).is_guarded:
+            bound = _largest_torque(protocol, model, 131.0)
+            found = largest_command(protocol, model.id, radians(131.0), radians(126.0))
+            assert 0.4 * bound < found <= bound + 1e-9, model.id
 
 
 def felt(protocol: Protocol, model: str, speed_deg_s: float, phase: float) -> str:
