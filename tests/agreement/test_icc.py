@@ -1,19 +1,15 @@
 """Intraclass correlations: Shrout and Fleiss' table, scipy's F, hand-worked means."""
 
 import math
-from typing import get_args
 
 import numpy as np
 import pytest
 
 from masrel.agreement import (
-    IccForm,
     icc,
     variance_components,
 )
 from masrel.errors import ParameterError, RatingsError
-
-FORMS = get_args(IccForm)
 
 # Shrout and Fleiss (1979), Table 2: six targets, four judges.
 TABLE_2 = [

@@ -32,8 +32,6 @@ from masrel.errors import (
 from tests.agreement.test_undefined import assert_undefined
 from tests.strategies import Table
 
-TESTS = [bowker, stuart_maxwell, bhapkar]
-
 # Stuart (1955), after Kendall: unaided vision of 7477 women, right eye by left eye.
 VISION = [
     [1520, 266, 124, 66],

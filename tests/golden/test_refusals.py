@@ -18,6 +18,7 @@ import numpy
 import pandas
 import pytest
 
+from masrel import plots
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.golden.call import folder, masrel
 from tests.lab.protocol.documents import changed, without, write
@@ -30,6 +31,7 @@ SETUP: list[str] = TABLE.pop("setup")
 
 STATISTICS = (
     *("agreement", "intervals", "ratings", "planning", "audit", "judges", "scales"),
+    "plots",
 )
 LABORATORY = (
     *("protocol", "schedule", "run", "recording", "elbow", "elbow.tone"),
@@ -63,6 +65,7 @@ NAMES = Names(
     ashworth=MODIFIED_ASHWORTH,
     protocol=protocol,
     array=numpy.array,
+    plots=plots,
     frame=pandas.DataFrame,
     path=Path,
     nan=float("nan"),

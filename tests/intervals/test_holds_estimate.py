@@ -94,7 +94,6 @@ DO_NOT_PROMISE = {
 }
 KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.formula is not None]
 OF_RATERS = ("raters", "both")
-OWN = [name for name, entry in COEFFICIENTS.items() if entry.has_interval]
 
 
 def test_every_method_is_in_a_list() -> None:

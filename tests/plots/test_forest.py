@@ -9,7 +9,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import StepPatch
 from numpy.typing import NDArray
 
-from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval
 from masrel.plots import forest
 from tests.plots.made import LONG, blank, estimate, interval, overlaps, spread, texts_of
@@ -59,12 +58,6 @@ def test_what_leaves_the_axis_is_an_arrow_at_its_end(
     assert left >= -1.05
     assert {marker for marker, _ in lines(axes)} == markers
     assert min(x for _, points in lines(axes) for x, _ in points) >= left
-
-
-@pytest.mark.parametrize("names", [{"labels": ["a"]}, {"groups": ["a"] * 3}])
-def test_names_of_others_are_refused(names: dict[str, list[str]]) -> None:
-    with pytest.raises(ParameterError, match="needs one for each of 2 estimates, got"):
-        forest([estimate()] * 2, **names, ax=blank())
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from masrel.errors import ParameterError
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, Trace, trace
 from masrel.plots import traces
 from tests.plots.made import blank, overlaps, texts_of
@@ -59,16 +58,3 @@ def test_names_lie_on_none_other(speeds: tuple[int, ...], quantity: str) -> None
     axes = traces([stretch(of) for of in speeds], labels=labels, quantity=quantity)
     assert overlaps(axes) == []
     assert sorted(of for of in texts_of(axes) if of in labels) == sorted(labels)
-
-
-@pytest.mark.parametrize(
-    ("made", "how", "words"),
-    [
-        ([], {}, "traces: needs at least one, got none"),
-        ([1, 2], {"labels": ["a"]}, "labels: needs one for each of 2 traces, got 1"),
-        ([1], {"quantity": "speed"}, "quantity: needs one of torque, angle, got"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused(made: list, how: dict, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        traces([stretch(90.0 * of) for of in made], **how, ax=blank())

@@ -39,15 +39,3 @@ def test_a_slope_is_the_derivative_of_the_value(
     expected = np.sqrt(len(u) / (len(u) - 1) * ((u - u.mean()) ** 2).sum())
     error = features.error(slope, freq)
     assert error == pytest.approx(expected, rel=1e-12)
-
-
-# Rater 2 alone rated two items, raters 0 and 1 alone another two.
-CODES = np.array(
-    [[0, 0, 0], [1, 1, 0], [2, 1, 1], [-1, -1, 2], [-1, -1, 2], [0, 2, -1], [1, 1, -1]],
-    dtype=np.int8,
-)
-POOLED = [  # the shares of Conger's raters are each rater's own
-    name
-    for name, entry in COEFFICIENTS.items()
-    if entry.formula and entry.formula.resampled and name != "conger_kappa"
-]

@@ -21,7 +21,6 @@ from masrel.intervals.latent._implied import (
 )
 from masrel.intervals.latent._model import LatentDensity, Traits, grade_shares
 from masrel.intervals.latent._sampler import (
-    Chains,
     quantile_error,
     sample_smooth,
 )
@@ -247,32 +246,6 @@ def test_these_items_agree_with_simulated_raters(
 
 
 SAMPLER = "masrel.intervals.latent._sampler"
-COVARIANCE = np.array([[1.0, 0.8, 0.0], [0.8, 1.0, 0.0], [0.0, 0.0, 0.01]])
-
-
-class Normal:
-    """A correlated normal on two scales."""
-
-    bend = np.linalg.inv(COVARIANCE)
-
-    def log_density(self, position: Floats) -> Floats:
-        density: Floats = -0.5 * ((position @ self.bend) * position).sum(axis=1)
-        return density
-
-    def gradient(self, position: Floats) -> Floats:
-        return -position @ self.bend
-
-
-def coordinates(position: Floats) -> dict[str, Floats]:
-    return {"position": position}
-
-
-def sampled(seed: int) -> Chains:
-    rng = np.random.default_rng(seed)
-    return sample_smooth(
-        Normal(), coordinates, 0.1 * rng.normal(size=(64, 3)),
-        generator=rng, n_steps=300, max_steps=4_800,
-    )  # fmt: skip
 
 
 def misses(values: Floats, law: Callable[[float], float]) -> float:
@@ -282,15 +255,6 @@ def misses(values: Floats, law: Callable[[float], float]) -> float:
         abs(float(np.quantile(values, p)) - law(p)) / quantile_error(values, p)
         for p in shares
     )
-
-
-def test_quantiles_of_a_normal_are_within_their_errors_and_repeat() -> None:
-    result = sampled(1)
-    # 4.5 errors, 15 times: once in 10 000 runs of other seeds
-    for k, variance in enumerate(np.diag(COVARIANCE)):
-        values = result.values["position"][..., k]
-        assert misses(values, stats.norm(scale=np.sqrt(variance)).ppf) < 4.5
-    assert sampled(1).positions.tobytes() == result.positions.tobytes()
 
 
 def prior_only(prior: LatentPrior) -> LatentDensity:

@@ -128,27 +128,3 @@ def test_an_estimate_that_is_new_or_gone_is_a_change(
     values = {each["of"]: each for each in document["changes"] if each["field"] == "id"}
     assert values["other"]["old"] is None
     assert values["percent"]["new"] is None
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (None, "needs an analysis.json, or a folder that has one"),
-        ("{", "is no analysis: "),
-        ("[]", "is no analysis of a study"),
-        ('{"study": "tone"}', "needs an analysis of the study 'hess2012', "),
-        ('{"study": "hess2012", "format": 9}', "needs format 1, got 9"),
-    ],
-)
-def test_what_is_no_older_report_is_refused_before_anything_is_made(
-    masrel: Caller, study: Path, tmp_path: Path, text: str | None, words: str
-) -> None:
-    shutil.rmtree(study / "report")
-    old = tmp_path / "old.json"
-    if text is not None:
-        old.write_text(text)
-    done = masrel("report", study, "--against", old)
-    assert done.code == 2
-    assert done.err.startswith("masrel: --against: ")
-    assert words in done.err
-    assert not (study / "report").exists()

@@ -145,8 +145,4 @@ def test_columns_are_their_rows(kind: type) -> None:
     assert objects.values == pytest.approx(table.values, rel=1e-14, nan_ok=True)
 
 
-def line(**columns: object) -> Columns:
-    return Columns(ConstantSpeed, **{"start": 0.5, "end": 2.5, "speed": 1.0} | columns)
-
-
 # Refused

@@ -6,7 +6,6 @@ from numpy.polynomial import Polynomial
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import (
-    ConstantSpeed,
     MinimumJerk,
     Motion,
     Part,
@@ -19,7 +18,6 @@ from tests.lab.elbow.scenes import KINDS, random_scene
 
 # From 0.5 to 2.5 rad at a mean of 1 rad/s: 2 rad in 2 s.
 REACH = MinimumJerk(start=0.5, end=2.5, mean_speed=1.0)
-LINE = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
 # ramps of 0.5 s and 0.25 rad, 1.5 rad at 1 rad/s between them
 RAMPS = Trapezoid(start=0.5, end=2.5, speed=1.0, acceleration_rate=2.0)
 

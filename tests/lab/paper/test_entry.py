@@ -165,21 +165,6 @@ def test_the_habits_of_spreadsheets_are_read(
     assert [fields["row"] for fields in entered] == [4 + below, 3 + below, 2 + below]
 
 
-@pytest.mark.parametrize(
-    ("data", "message"),
-    [
-        (b"PK\x03\x04 and so on", 'got a workbook: save the sheet as "CSV UTF-8"'),
-        (b"code\n1,\xe4,2\n", "line 2: needed UTF-8 text, got the byte 0xe4"),
-        (b"", "needed the columns position, code, grade, got nothing"),
-    ],
-)
-def test_another_file_is_refused(small: Small, data: bytes, message: str) -> None:
-    file = small[0].root / "typed.txt"
-    file.write_bytes(data)
-    with pytest.raises(RatingsError, match=message):
-        enter(small, file)
-
-
 ABOUT_THE_STUDY = """
 [[questionnaires]]
 id = "all"

@@ -1,12 +1,11 @@
 """The bundled published study says what the paper's tables say."""
 
 import csv
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
-from masrel.lab.protocol import Model, Protocol, read_protocol
+from masrel.lab.protocol import Protocol, read_protocol
 
 STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
 
@@ -32,16 +31,6 @@ def protocol() -> Protocol:
 def rows(name: str) -> list[dict[str, str]]:
     with (STUDY / "ratings" / name).open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
-
-
-def four(model: Model) -> tuple[Fraction, ...]:
-    values = (
-        model.catch_angle_constant_deg,
-        model.catch_torque_nms_rad,
-        model.residual_ratio,
-        model.catch_travel_deg,
-    )
-    return tuple(Fraction(str(value)) for value in values)  # the decimals as written
 
 
 def test_the_published_ratings_are_table_v_cell_by_cell() -> None:

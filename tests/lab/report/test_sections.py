@@ -43,7 +43,6 @@ from tests.lab.report.pages import (
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 
 replace = msgspec.structs.replace
-Changes = dict[str, dict[str, Any]]
 
 
 def study(

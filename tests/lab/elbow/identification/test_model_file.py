@@ -89,6 +89,3 @@ def test_what_differs_is_interpolated_and_the_rest_is_kept() -> None:
     assert made.damping == pytest.approx(1.63, rel=1e-15)
     assert made.catch_torque_constant == pytest.approx(1.9, rel=1e-15)
     assert replace(made, damping=1.26, catch_torque_constant=1.4) == one
-
-
-ADDITIVE = replace(STANDARD_MODELS["HM2"], post_catch="additive")

@@ -19,7 +19,6 @@ from masrel.errors import (
 )
 from masrel.lab.hess import RealClock, SimulatedClock, open_device
 from masrel.lab.hess.puck import (
-    PropertyTable,
     PuckOptions,
     property_table,
     read_property_table,
@@ -295,36 +294,6 @@ def test_a_table_of_ones_own_opens_an_unknown_firmware(tmp_path: Path) -> None:
     options = {"emulator": emulator, "properties": table}
     with opened(SimulatedClock(), stretching(), **options) as device:
         assert device.is_open
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", r"needs one table, \[properties\]"),
-        ("properties = 3", r"needs one table, \[properties\]"),
-        ("[properties", "not TOML"),
-        ("[properties]\nT = 42", "properties: need MODE, MT, "),
-        ("[properties]\nT = '42'", "properties.T: needs a whole number, got '42'"),
-        ({"MT": 42}, "needs a number of its own, 42 is taken by"),
-        ({"MT": 49}, "needs a number of its own, 49 is taken by"),  # P takes 48 and 49
-        ({"T": 5}, "properties.T: needs 8 to 126, got 5"),
-        ({"T": 128}, "properties.T: needs 8 to 126, got 128"),
-    ],
-)
-def test_a_table_that_is_none_or_contradicts_itself_is_refused(
-    tmp_path: Path, text: str | dict[str, int], words: str
-) -> None:
-    path = tmp_path / "puck.toml"
-
-    def table() -> PropertyTable:
-        if isinstance(text, dict):
-            return PropertyTable(numbers={**REQUIRED, **text})
-        path.write_text(text)
-        return read_property_table(path)
-
-    with pytest.raises(ParameterError, match=words) as caught:
-        table()
-    assert str(caught.value).startswith(str(path)) is isinstance(text, str)
 
 
 # In torque mode

@@ -5,12 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.lab.elbow import STANDARD_MODELS, fit
 from masrel.lab.elbow.identification import ElbowFit
 from masrel.lab.report import _fit_figures as figures
-from masrel.lab.report._fits import fit_figures, fit_table
+from masrel.lab.report._fits import fit_figures
 from tests.lab.elbow.identification.synthesis import Scatter, study
-from tests.lab.elbow.identification.test_friction import backdriven
 
 
 def svg_of(found: ElbowFit, view: str) -> str:
@@ -20,17 +19,6 @@ def svg_of(found: ElbowFit, view: str) -> str:
 @pytest.fixture(scope="module")
 def found() -> ElbowFit:
     return fit(study(STANDARD_MODELS["HM3"], seed=31, n_slow=3, n_fast=6))
-
-
-def test_a_fit_has_its_figures_which_repeat_byte_for_byte(found: ElbowFit) -> None:
-    figures = fit_figures(found)
-    assert sorted(figures) == ["fit_catches", "fit_residuals", "fit_slow", "fit_trials"]
-    assert fit_figures(found) == figures
-
-
-def test_only_slow_trials_have_figures_too() -> None:
-    found = fit(study(STANDARD_MODELS["HM3"], seed=31, n_slow=3, n_fast=0))
-    assert sorted(fit_figures(found)) == ["fit_residuals", "fit_slow"]
 
 
 @pytest.mark.slow
@@ -50,12 +38,6 @@ def test_the_legend_of_slow_trials_has_every_term(
 ) -> None:
     movements = study(STANDARD_MODELS["HM3"], seed=31, n_slow=5, n_fast=0)
     assert svg_of(fit(movements, **terms), "slow").count(f"<!-- {law} -->") == 1  # type: ignore[arg-type]
-
-
-def test_friction_has_its_figure_and_table() -> None:
-    found = fit_friction([backdriven(1)])
-    assert list(fit_figures(found)) == ["fit_friction"]
-    assert [row[0] for row in fit_table(found).rows] == ["I", "B", "β"]
 
 
 @pytest.fixture(scope="module")
@@ -115,8 +97,3 @@ def test_a_bin_of_few_samples_has_no_mean() -> None:
     np.testing.assert_allclose(middles[[0, -1]], [width / 2, 1.0 - width / 2])
     np.testing.assert_allclose(means[0], 3.005)
     assert np.isnan(means[1:]).all()
-
-
-def test_every_catch_has_a_peak_above_its_residual(found: ElbowFit) -> None:
-    assert [read.catch for read in found.levels] == figures._catches(found)
-    assert all(read.peak > read.residual > 0.0 for read in found.levels)

@@ -236,37 +236,6 @@ def test_the_page_fits_on_a_screen_and_needs_no_mouse(stage: Stage) -> None:
     sees(coordinator, f"Session test: {stage.rater} ")
 
 
-def test_a_model_is_left_without_a_grade_after_a_fault_by_either(
-    slow_stage: Stage,
-) -> None:
-    stage, page = slow_stage, slow_stage.coordinator.page
-    rater = stage.session()
-    rater.begin()
-    rater.page.locator("#stop").tap()
-    rater.wait_for("fault")
-    rater.page.locator("summary", has_text="Leave it without a grade").tap()
-    rater.tap("Leave it without a grade")
-    expect(rater.page.locator(".refused")).to_have_text("Write a reason first.")
-    rater.page.locator("#why").fill("the motor is hot")
-    rater.tap("Leave it without a grade")
-    rater.begin()
-    rater.page.locator("#stop").tap()
-    rater.wait_for("fault")
-    (skipped,) = (event.fields for event in stage.log() if event.kind == "skipped")
-    assert (skipped["position"], skipped["why"]) == (1, "the motor is hot")
-    sees(stage.coordinator, "1 skipped", "#sessions")
-    press(page, "Pause the session")
-    sees(stage.coordinator, "No session runs")
-    code = str(stage.log()[-2].fields["code"])
-    which = {"rater": stage.rater, "session": "test", "code": code}
-    expect(form(page, SKIP, **which, **SIGNED)).to_contain_text("without a grade")
-    assert (stage.kinds()[-1], stage.log()[-1].fields["who"]) == ("skipped", "MK")
-    # the page itself says what comes next, and does it
-    page.locator("#next button", has_text="Go on with it").click()
-    sees(stage.coordinator, "Session test: R")  # whoever's was begun first
-    expect(page.locator("#next")).to_be_empty()
-
-
 QUICKLY_PLANNED = {
     **{"id": "kappa", "kind": "inter-rater", "coefficient": "fleiss_kappa"},
     **{"models": "standard", "sessions": ["test"], "target": "items"},
