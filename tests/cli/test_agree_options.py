@@ -18,7 +18,6 @@ from tests.cli.process import Caller, Done
 # Four patients by three raters, one gap.
 WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
 SCALE = ("1", "1+", "2", "3")
-TABLE_V = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 JSON = ("--json", "-")
 ROWS = [["1", "1+", "1"], ["2", None, "2"], ["1", "1", "2"], ["3", "3", "3"]]
 
@@ -39,28 +38,6 @@ def estimates(done: Done) -> list[dict[str, Any]]:
         "estimates"
     ]
     return found
-
-
-@pytest.mark.parametrize("more", [(), ("--target", "items"), ("--target", "raters")])
-def test_csv_has_every_digit_of_the_json(
-    masrel: Caller, wide: Path, more: tuple[str, ...]
-) -> None:
-    call = ("agree", wide, "--coefficients", "all", *more)
-    rows = list(csv.DictReader(io.StringIO(masrel(*call, "--csv").out)))
-    found = estimates(masrel(*call, "--json", "-"))
-    assert len(rows) == len(found) > 12
-    for row, document in zip(rows, found, strict=True):
-        interval = document["interval"] or {"low": None, "high": None}
-        for key, number in (
-            ("value", document["value"]),
-            ("standard_error", document["standard_error"]),
-            ("low", interval["low"]),
-            ("high", interval["high"]),
-        ):
-            assert row[key] == "" if number is None else float(row[key]) == number
-        assert int(row["n_items"]) == document["n_items"]
-        assert int(row["n_raters"]) == document["n_raters"]
-        assert row["coefficient"].isprintable()
 
 
 def test_json_in_a_file_leaves_the_table_on_stdout(
@@ -153,15 +130,6 @@ def test_verbs_and_options_are_guessed(masrel: Caller, wide: Path) -> None:
     done = masrel("qqq")
     assert (done.code, done.out) == (2, "")
     assert "No such command 'qqq'." in done.err
-
-
-def test_table_v_gives_its_kappa_to_the_last_digit(masrel: Caller) -> None:
-    fleiss, percent = "fleiss_kappa", "percent_agreement"
-    found = {e["coefficient"]: e for e in estimates(masrel("agree", TABLE_V, *JSON))}
-    assert found[fleiss]["value"] == pytest.approx(0.626083678854127, abs=1e-15)
-    # 81 of 112 pairs of raters agree: 21 + 16 + 28 + 16, of 28 pairs a model
-    assert found[percent]["value"] == 81 / 112
-    assert found[fleiss]["interval"] is None
 
 
 def test_estimates_in_small_units_keep_their_digits(

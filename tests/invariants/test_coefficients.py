@@ -4,8 +4,7 @@ import inspect
 import math
 import random
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import get_args
 
 import pytest
@@ -258,51 +257,5 @@ def test_every_public_coefficient_is_registered() -> None:
     assert all(name == entry.name for name, entry in COEFFICIENTS.items())
 
 
-def test_a_function_forgotten_in_the_register_would_be_seen(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    fewer = {name: e for name, e in COEFFICIENTS.items() if name != "cohen_kappa"}
-    monkeypatch.setitem(globals(), "COEFFICIENTS", fewer)
-    with pytest.raises(AssertionError):
-        test_every_public_coefficient_is_registered()
-
-
 def test_every_property_has_a_test() -> None:
     assert tested == set(get_args(Property))
-
-
-def _first_rater_counts_double(ratings: Table, **_: object) -> float:
-    return sum(row[0] == row[-1] for row in ratings) / len(ratings)
-
-
-def _first_item_counts(ratings: Table, **_: object) -> float:
-    return float(ratings[0][0] == ratings[0][1])
-
-
-def _categories_met(ratings: Table, **_: object) -> float:
-    return 1.0 / len({grade for row in ratings for grade in row})
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("value", "check"),
-    [
-        (_first_rater_counts_double, test_order_of_raters_does_not_matter),
-        (_first_item_counts, test_order_of_items_does_not_matter),
-        (_categories_met, test_perfect_agreement_on_two_categories_is_exactly_1),
-    ],
-)
-def test_the_checks_can_fail(
-    value: Callable[..., float], check: Callable[..., None]
-) -> None:
-    sound = COEFFICIENTS["percent_agreement"]
-
-    def broken(
-        ratings: Table, *, categories: tuple[str, ...], weights: WeightName
-    ) -> Estimate:
-        found = sound.function(ratings, categories=categories, weights=weights)
-        return replace(found, value=value(ratings), standard_error=0.0, reason=None)
-
-    random.seed(0)
-    with pytest.raises(AssertionError):
-        check(entry=replace(sound, function=broken))

@@ -10,7 +10,6 @@ import pytest
 import statsmodels.api as sm
 from scipy.optimize import minimize
 
-from masrel.errors import UndefinedStatisticWarning
 from masrel.lab.analysis import grade_regression
 from masrel.lab.protocol import Protocol, read_protocol, scale_of
 from masrel.lab.ratings import Ratings, ratings_from_rows, read_study_ratings
@@ -131,20 +130,6 @@ def published() -> tuple[Protocol, Ratings]:
         STUDY / "ratings" / "published.csv", scale_of(protocol)
     )
     return protocol, ratings
-
-
-def test_four_models_cannot_tell_four_parameters_apart() -> None:
-    protocol, ratings = published()
-    with pytest.warns(UndefinedStatisticWarning, match="separate some grades"):
-        found = grade_regression(protocol, ratings)
-    assert found.dropped == (("D", "it is a combination of L, H, Q in these ratings"),)
-    # nobody gave HM1 or HM2 a 2, or HM3 or HM4 a 1+: the gap can grow for ever
-    assert found.reason is not None
-    assert all(math.isnan(effect.odds_ratio) for effect in found.effects)
-    assert (found.n_ratings, found.n_raters, found.n_models) == (32, 8, 4)
-    # the most severe model was stretched slowest in Table V
-    (effect,) = grade_regression(protocol, ratings, predictors=("speed",)).effects
-    assert effect.low < effect.odds_ratio < min(1.0, effect.high)
 
 
 def test_q_is_the_residual_whichever_way_a_model_reads_it(tmp_path: Path) -> None:

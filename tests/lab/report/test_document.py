@@ -167,34 +167,6 @@ def test_html_and_markdown_hold_the_same_tables(
     assert len(in_html) == len(files.tables) + 1 + n_further  # estimates: twice
 
 
-@pytest.mark.parametrize("report", ["published", "simulated"])
-def test_a_page_shows_the_numbers_of_the_csv_rounded(
-    report: str, request: pytest.FixtureRequest
-) -> None:
-    files: ReportFiles = request.getfixturevalue(report)
-    n_compared = 0
-    tables = [table for table in page_of(files).tables if table[0][0] != "Estimate"]
-    paths = [p for p in files.tables if p.stem not in ("agreement", "test_retest")]
-    for path, (_, *shown) in zip(paths, tables, strict=True):
-        head, *rows = csv_rows(path)
-        if "low" in head and "high" in head and path.stem != "order_effects":
-            continue  # one interval on a page: test_estimates.py, test_sections.py
-        for exact, page in zip(rows, shown, strict=True):
-            for value, cell in zip(exact[:-1], page, strict=True):
-                n_compared += 1
-                assert _is_shown_as(value, cell), (path.name, head, value, cell)
-    assert n_compared > 100
-
-
-def _is_shown_as(value: str, cell: str) -> bool:
-    if value == "":
-        return cell in ("–", "undefined")
-    if cell == value or cell == value.replace("_", ""):  # text, with a low index
-        return True
-    digits = len(cell.partition(".")[2])
-    return abs(float(cell.replace("−", "-")) - float(value)) <= 0.5000001 * 10**-digits
-
-
 def test_the_inputs_are_named_and_symbols_have_their_index_set_low(
     published: ReportFiles,
 ) -> None:
