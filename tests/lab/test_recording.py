@@ -157,16 +157,6 @@ def test_a_channel_is_written_with_its_name_and_unit(
     assert np.array_equal(column, [0.1, np.nan, 2, 3], equal_nan=True)
 
 
-def test_a_recording_without_channels_says_nothing_of_them(
-    recording: Recording, tmp_path: Path
-) -> None:
-    write_recording(recording, tmp_path / "a.npz")
-    with np.load(tmp_path / "a.npz") as archive:
-        assert archive.files == list(RECORDING_COLUMNS)
-    facts = json.loads((tmp_path / "a.json").read_text())
-    assert facts.keys() == {"format", "sha256", *recording.facts}
-
-
 def test_a_channel_needs_its_column_and_a_column_its_channel(
     recording: Recording, measured: Recording
 ) -> None:

@@ -10,13 +10,12 @@ from typing import Any
 import pytest
 
 from masrel.agreement import fleiss_kappa
-from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval
 from masrel.intervals import estimate
 from masrel.lab.analysis import (
     Analysis,
     analyze,
-    as_analysis_document,
     to_frame,
     write_analysis,
 )
@@ -42,26 +41,11 @@ def published() -> Analysis:
     return analyze(protocol, table_v(), in_person=in_person())
 
 
-def undefined() -> Analysis:
-    same = ratings(*of_session("test", R1=("1", "1"), R2=("1", "1")))
-    with pytest.warns(UndefinedStatisticWarning):
-        return analyze(protocol_with(plan(interval="analytic", target="items")), same)
-
-
 def read_back(analysis: Analysis, folder: Path) -> dict[str, Any]:
     path = folder / "deep" / "analysis.json"
     write_analysis(analysis, path)
     document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return document
-
-
-def test_nan_is_null_with_a_reason(tmp_path: Path) -> None:
-    (line,) = read_back(undefined(), tmp_path)["estimates"]
-    for part in (line["estimate"], line["estimate"]["interval"]):
-        assert part["value" if "value" in part else "low"] is None
-        assert part["reason"]
-    write_analysis(undefined(), tmp_path / "strict.json")  # JSON has no nan
-    assert "NaN" not in (tmp_path / "strict.json").read_text()
 
 
 def test_the_inputs_are_named_by_hashes_anybody_can_check(tmp_path: Path) -> None:
@@ -92,12 +76,6 @@ def test_ratings_without_a_file_are_named_by_their_rows() -> None:
     other = analyze(protocol_with(), ratings(*rows[:-1]))
     assert found.inputs["ratings_sha256"] != other.inputs["ratings_sha256"]
     assert "in_person_sha256" not in found.inputs
-
-
-def test_parts_nobody_asked_for_are_null() -> None:
-    document = as_analysis_document(analyze(protocol_with(), table_v()))
-    assert document["intended"] is None
-    assert document["speeds"] is None
 
 
 RATINGS = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]] * 3

@@ -5,33 +5,6 @@ from pathlib import Path
 import pytest
 
 from tests.cli.process import Caller
-from tests.files import edit
-
-
-def test_a_new_study_is_checked_drawn_and_checked_again(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    study = tmp_path / "study"
-    masrel("init", study)
-    assert "no problems" in masrel("check", study).out
-    assert "2 drawn, 0 kept" in masrel("schedule", study).out
-    assert "0 drawn, 2 kept" in masrel("schedule", study).out
-    assert "2 of 2 schedules drawn" in masrel("check", study).out
-    protocol = study / "protocol.toml"
-    edit(protocol, "seed = 20240", "seed = 1")
-    (study / "ratings").mkdir()
-    table = "session,rater,model,grade\ntest,R1,HM1,9\n"
-    (study / "ratings" / "ratings.csv").write_text(table, encoding="utf-8")
-    checked = masrel("check", study)
-    assert checked.code == 2
-    sentence = "schedule.seed was 20240 and is 1 since the draw: 2 of 2 schedules are"
-    assert f"{protocol}: {sentence} stale\n" in checked.err
-    assert "ratings.csv" in checked.err
-    published = tmp_path / "published"
-    masrel("init", published, "--study", "hess2012")
-    counts = "16 models, 8 raters, 2 sessions; 0 of 11 schedules drawn"
-    assert counts in masrel("check", published).out
-
 
 LIMIT = ("torque_limit_nm = 20.0", "torque_limit_nm = 19.9")
 SLOW = ("speed_limit_deg_s = 400", "speed_limit_deg_s = 140")

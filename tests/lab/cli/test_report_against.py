@@ -77,19 +77,6 @@ def test_a_grade_changes_what_it_enters(masrel: Caller, study: Path) -> None:
     assert document["inputs"][0].startswith("ratings: SHA-256 ")
 
 
-def test_a_reason_that_changes_is_of_its_own_number(
-    masrel: Caller, study: Path, tmp_path: Path
-) -> None:
-    old = Path(shutil.copytree(study / "report", tmp_path / "old"))
-    analysis = json.loads((old / "analysis.json").read_text("utf-8"))
-    analysis["estimates"][0]["estimate"]["reason"] = "no spread"
-    (old / "analysis.json").write_text(json.dumps(analysis), "utf-8")
-    (change,) = compared(masrel, study, "--against", old)["changes"]
-    assert (change["of"], change["field"]) == ("percent", "reason")
-    assert (change["old"], change["new"]) == ("no spread", None)
-    assert change["difference"] is None
-
-
 @pytest.mark.parametrize("writes", [False, True])
 def test_a_change_fails_if_asked_to(
     masrel: Caller, study: Path, tmp_path: Path, writes: bool

@@ -68,23 +68,6 @@ def test_every_count_is_that_of_the_files(masrel: Caller, study: StudyPaths) -> 
     assert south["model_runs"] == [1, 1]
 
 
-def test_runs_of_models_grades_and_standards_are_counted(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    study = study_of(tmp_path / "study", "blocks", blocks_by="role", repeats=3)
-    masrel("schedule", study.root)
-    (of,) = json.loads(masrel("schedule", "show", study.root, "--json", "-").out)[
-        "sessions"
-    ]
-    assert of["standard_runs"] == [6] * 6
-    for index, rater in enumerate(f"R{n}" for n in range(1, 7)):
-        schedule = read_schedule(study.schedule_file(rater, "test"))
-        text = " ".join(shown.model for shown in schedule.presentations)
-        runs = {n for n in (1, 2, 3) for m in of["models"] if " ".join([m] * n) in text}
-        assert of["model_runs"][index] == max(runs)
-        assert of["grade_runs"][index] <= of["model_runs"][index]
-
-
 def test_a_row_that_was_forged_is_broken(masrel: Caller, study: StudyPaths) -> None:
     masrel("schedule", study.root)
     file = study.schedule_file("R1", "test")

@@ -18,7 +18,6 @@ from masrel.lab.elbow import (
     ConstantSpeed,
     events,
 )
-from masrel.lab.elbow.identification import as_toml, model_document
 from masrel.lab.elbow.tone import ClaspKnife, Contracture, ToneModel
 from masrel.lab.recording import RECORDING_COLUMNS, Recording, write_recording
 from tests.lab.elbow.stretches import minimum_jerk
@@ -122,16 +121,6 @@ def test_a_figure_explains_its_phases_where_one_catches(tmp_path: Path) -> None:
         assert [f"{speed} deg/s" in texts for speed in speeds] == [True] * len(speeds)
 
 
-def test_lines_of_a_figure_have_as_many_points_as_pixels(tmp_path: Path) -> None:
-    # 0.001 deg/s: 116 000 s, at 1 kHz 116 million samples
-    slow = ("--model", "HM3", "--speed-deg-s", 0.001)
-    file = tmp_path / "slow.svg"
-    assert run(*slow, "--figure", file).exit_code == 0
-    paths = re.findall(r'<path d="([^"]*)"', file.read_text("utf-8"))
-    n_points = [len(re.findall("[ML]", path)) for path in paths]
-    assert 1 < max(n_points) < 900
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -219,25 +208,6 @@ def test_numbers_that_are_very_long_or_short_stay_apart() -> None:
 
 
 # Model files
-
-
-def model_file(folder: Path, name: str = "S3.toml", **changes: object) -> Path:
-    made = model_document(HM3, simulated=True, made_from="a test")
-    made["constants"] = {**made["constants"], **changes}  # type: ignore[dict-item]
-    path = folder / name
-    path.write_text(as_toml(made), encoding="utf-8")
-    return path
-
-
-def test_a_fitted_model_is_traced_from_its_file(tmp_path: Path) -> None:
-    made = scene("--model", model_file(tmp_path), "--speed-deg-s", 92)
-    assert made["model"] == "S3"
-    assert made["peak_torque_nm"] == pytest.approx(
-        scene(*STRETCH)["peak_torque_nm"], rel=1e-14
-    )
-    variant = model_file(tmp_path, "S4.toml", rest_angle_deg=20.0)
-    moved = scene("--model", variant, "--speed-deg-s", 92)["peak_torque_nm"]
-    assert moved - made["peak_torque_nm"] == pytest.approx(radians(3.15 * 10))
 
 
 # Other kinds of joints

@@ -11,7 +11,6 @@ import sys
 from datetime import date
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rocrate.rocrate import ROCrate
 
@@ -20,7 +19,6 @@ from masrel.lab.conduct import record_standing
 from masrel.lab.export import EXPORT_FORMS, export_study
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import read_study_data
-from masrel.lab.recording import RECORDING_COLUMNS, read_recording
 from masrel.lab.report import study_conduct, write_report
 from masrel.lab.run import ScriptGrades, record_correction, run_session
 from masrel.lab.schedule import read_schedule, write_schedules
@@ -180,28 +178,6 @@ def test_bids_is_valid(rated: Study, tmp_path: Path) -> None:
     assert [issue for issue in issues if issue["severity"] == "error"] == []
     (folder / "participants.tsv").write_text("participant_id\nsub-R9\n")
     assert subprocess.run([validator, folder], capture_output=True).returncode != 0
-
-
-def test_a_recording_of_bids_has_every_sample_to_the_last_bit(
-    rated: Study, bids: Path
-) -> None:
-    study, _ = rated
-    sidecars = sorted(bids.rglob("*_physio.json"))
-    assert len(sidecars) == len(list(study.sessions.rglob("*.npz"))) == 6
-    for sidecar in sidecars:
-        facts = json.loads(sidecar.read_text())
-        assert facts["SamplingFrequency"] == 1000
-        assert tuple(facts["Columns"]) == RECORDING_COLUMNS
-        assert facts["command_torque_nm"]["Units"] == "N*m"
-        text = gzip.decompress(sidecar.with_suffix(".tsv.gz").read_bytes()).decode()
-        rows = np.array([line.split("\t") for line in text.splitlines()], dtype=float)
-        label = re.search("sub-(.*)_ses-(.*)_task-MAS_recording-(.*)_", sidecar.name)
-        assert label is not None
-        rater, session, code = label.groups()
-        folder = study.log_file(rater, session).with_suffix("")
-        recording = read_recording(folder / f"{code}.npz")
-        for place, name in enumerate(facts["Columns"]):
-            np.testing.assert_array_equal(rows[:, place], recording.columns[name])
 
 
 def test_an_answer_of_two_lines_keeps_both(rated: Study, tmp_path: Path) -> None:

@@ -90,24 +90,6 @@ def test_it_asks_for_the_torque_of_the_trace_bit_for_bit(
 # Phases
 
 
-@pytest.mark.parametrize(
-    ("model", "speed_deg_s", "phases"),
-    [
-        *(
-            (name, 100.0, "pre-catch, catch, post-catch, pre-catch")
-            for name in MODELS[1:]
-        ),
-        ("HM1", 100.0, "pre-catch, catch"),  # it reaches the end of range within it
-        ("HM4", 18.0, "pre-catch"),  # below the speed threshold
-    ],
-)
-def test_the_phases_come_in_the_order_of_figure_7(
-    model: str, speed_deg_s: float, phases: str
-) -> None:
-    facts = present(model, speed_deg_s).recording.facts
-    assert (facts["phases"], facts["ended"]) == (phases, "arrived")
-
-
 # The estimated speed
 
 

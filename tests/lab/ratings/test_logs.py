@@ -1,20 +1,16 @@
 """Ratings from logs: corrected, checked against recordings, missing where missing."""
 
-import io
 import stat
 from collections.abc import Callable
-from datetime import UTC, datetime
 
 import pytest
 
-from masrel.errors import RatingsError, SessionLogError, SessionStoppedError
+from masrel.errors import RatingsError, SessionLogError
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import rating_matrix, ratings_from_logs, write_ratings
 from masrel.lab.run import (
-    ConsoleGrades,
     ScriptGrades,
     SessionLog,
-    record_correction,
     run_session,
 )
 from masrel.lab.schedule import read_schedule
@@ -38,28 +34,6 @@ def test_a_session_that_has_begun_has_a_row_for_every_model(small: Small) -> Non
     assert ratings.table["grade"].tolist() == ["1+", None, None]
     assert ratings.table["mean_speed_deg_s"].isna().tolist() == [False, False, True]
     assert rating_matrix(ratings, session="test").n_missing == 2
-
-
-def test_what_happened_to_each_presentation_is_in_the_table(small: Small) -> None:
-    study, protocol = small
-    answers = io.StringIO("\nagain\n\n1\n\n2\n")
-    source = ConsoleGrades(protocol.scale, answers=answers, questions=io.StringIO())
-    with pytest.raises(SessionStoppedError):
-        run_session(*small, "R1", "test", grades=source, clock="simulated", now=nine)
-    shown = read_schedule(study.schedule_file("R1", "test")).presentations
-    by = {"code": shown[0].code, "who": "Kim", "why": "wrong arm"}
-    record_correction(*small, "R1", "test", grade="1+", **by)
-    table = ratings_from_logs(*small).table
-    assert table["position"].tolist() == [1, 2, 3]
-    assert table["code"].tolist() == [each.code for each in shown]
-    assert table["n_attempts"].tolist() == [2, 1, 0]
-    assert table["grade"].tolist() == ["1+", "2", None]
-    assert table["first_grade"].tolist() == ["1", "2", None]
-    assert table["graded_at"].tolist() == [*2 * ["2026-05-04T09:00:00.000Z"], None]
-
-
-def nine() -> datetime:
-    return datetime(2026, 5, 4, 9, tzinfo=UTC)
 
 
 def test_a_table_with_codes_is_its_owners_alone(small: Small) -> None:

@@ -15,14 +15,6 @@ from tests.lab.report.pages import (
 )
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
-
-
 def csv_rows(path: Path) -> list[list[str]]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.reader(file))
@@ -81,17 +73,6 @@ def test_a_main_part_comes_before_a_folded_supplement(published: ReportFiles) ->
     assert re.findall("^## (.*)$", markdown, re.M)[-3:] == [
         "Methods", "Supplement", "Provenance",
     ]  # fmt: skip
-
-
-def test_no_file_holds_a_time_of_day(published: ReportFiles) -> None:
-    folder = published.html.parent
-    for name, data in contents(folder).items():
-        if not name.endswith(".png"):
-            assert not re.search(rb"\b20\d\d-\d\d-\d\d\b|\b\d\d:\d\d:\d\d\b", data), (
-                name
-            )
-        assert b"dc:date" not in data
-        assert b"tIME" not in data
 
 
 def n_further_parts(page: Page) -> int:

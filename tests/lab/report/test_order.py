@@ -154,24 +154,3 @@ def test_one_rater_has_no_interval(tmp_path: Path) -> None:
     (found,) = effects(tmp_path, made).values()
     assert (found[3], found[-1]) == (1.0, "one rater has no spread")
     assert found[4] != found[4]
-
-
-ORDER = " ".join(f"D{n:02}=1" for n in range(1, 9))
-EIGHT = {"R1": ORDER, "R2": ORDER}
-# intended are 1, 1+ and 2: R1 HM1; R2 HM3 in the first place; then HM3; HM2
-THREE = {"R1": "HM1=1 HM2=2 HM3=2", "R2": "HM3=2 HM1=0 HM2=1+"}
-
-
-@pytest.mark.parametrize(
-    ("orders", "parts"),
-    [
-        (EIGHT, [(places, 4, 0, 0) for places in ("1–2", "3–4", "5–6", "7–8")]),
-        (THREE, [("1", 2, 2, 2), ("2–3", 4, 4, 2)]),
-    ],
-)
-def test_places_are_counted_in_quarters_and_halves(
-    orders: dict[str, str], parts: list[tuple[Any, ...]], tmp_path: Path
-) -> None:
-    names = ("n_ratings", "n_standard", "n_intended")
-    rows = rows_of(reported(tmp_path, presented(**orders)), "grades_by_place")
-    assert [(r["places"], *(int(r[n]) for n in names)) for r in rows] == parts

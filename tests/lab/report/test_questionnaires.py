@@ -1,6 +1,5 @@
 """The section of questionnaires says how questions were answered, not by whom."""
 
-import dataclasses
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -54,14 +53,6 @@ def test_the_published_realism_is_printed_and_its_answers_are_no_bodys(
     assert "7.63 ± 0.92" in section
     assert section.count("not the answers that were given") >= 2
     assert "R1" not in section
-
-
-def test_models_stand_in_the_order_of_the_protocol() -> None:
-    # that of the answers says who met which when
-    came = ("HM3", "D02", "HM1")
-    answers = [dataclasses.replace(score(5), model=model) for model in came]
-    shown = [summary.model for summary in summaries_of(*answers, score(5))]
-    assert shown == ["HM1", "HM3", "D02", None]
 
 
 def test_numbers_are_summed_up_as_by_hand() -> None:

@@ -6,7 +6,6 @@ from math import radians
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import (
@@ -283,22 +282,6 @@ def runs_of(
         for speed in speeds
         for v in (speed, -speed)
     ]
-
-
-@given(
-    st.floats(0.0, 1.0),
-    st.floats(0.0, 1.0),
-    st.floats(-0.5, 0.5),
-    speeds.filter(lambda values: max(values) - min(values) > 0.1),
-)
-def test_a_fit_without_noise_gives_the_truth(
-    viscous: float, coulomb: float, offset: float, speeds: list[float]
-) -> None:
-    estimate = fit_friction(runs_of(viscous, coulomb, offset, speeds))
-    assert estimate.viscous == pytest.approx(viscous, abs=1e-10)
-    assert estimate.coulomb == pytest.approx(coulomb, abs=1e-10)
-    assert estimate.offset == pytest.approx(offset, abs=1e-10)
-    assert estimate.viscous_error < 1e-9
 
 
 def test_errors_are_those_of_least_squares() -> None:

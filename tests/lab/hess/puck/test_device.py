@@ -235,23 +235,6 @@ def test_no_arm_is_beyond_its_ends(angle_deg: float, monkeypatch) -> None:
         zeroed(monkeypatch, angle_deg=angle_deg)
 
 
-@pytest.mark.parametrize(
-    ("interface", "channel", "moves"),
-    [
-        ("socketcan", "can0", True),
-        ("pcan", "PCAN_USBBUS1", True),
-        ("socketcan", "vcan0", False),
-        ("virtual", "here", False),
-        ("udp_multicast", "239.0.0.1", False),
-    ],
-)
-def test_options_say_whether_hardware_may_move(
-    interface: str, channel: str, moves: bool
-) -> None:
-    options = PuckOptions(interface=interface, channel=channel)
-    assert options.moves_hardware is moves
-
-
 # Numbers of properties, of a firmware or from a file
 
 # The least that a table needs

@@ -66,21 +66,6 @@ def angle_deg(one: Bench) -> float:
 # Asleep and awake
 
 
-def test_it_starts_in_its_monitor_and_leaves_the_bus_while_it_wakes(on) -> None:
-    one = on(wake_s=0.01)
-    assert [one.node.get(number) for number in (STAT, VERS, ROLE)] == [0, 148, 0]
-    for number in (MODE, T, P, CTS, IPNM):  # asleep it answers nothing else
-        assert answers(one, 1, bytes((number,))) == []
-    told(one, (MODE, 2))
-    assert one.emulator.settings[-1].name == "LOCK"  # asleep 8 is not its mode
-    assert one.emulator.mode == 0
-    told(one, (STAT, 2), wait_s=0.009)
-    assert answers(one, 1, bytes((STAT,))) == []
-    assert one.emulator.n_disturbances == 1
-    assert told(one).node.get(STAT) == 2
-    assert position(one) == 0  # it counts from where the arm was when it was asleep
-
-
 # Answers
 
 

@@ -7,7 +7,6 @@ B > T / (2 (1 - cos ωT)) Re((1 - exp(-jωT)) H(exp(jωT))).
 
 import math
 from math import radians
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     Friction,
     SimulatedClock,
@@ -32,7 +30,6 @@ from masrel.lab.hess._simulated import (
 from tests.benchmarks.driver_integrators import by_solve_ivp, chosen, commands
 from tests.lab.hess.rig import MODELS, controls, stretching
 
-PAGE = (Path(__file__).parents[4] / "docs" / "driver.md").read_text(encoding="utf-8")
 STEP_NS = 500_000
 QUANTUM = 18.8 / 2700.0
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}
@@ -173,7 +170,6 @@ def test_its_noise_and_its_steps_are_those_stated() -> None:
 # Whether the rendered joint can feed energy into a hand: the numbers of the page
 
 PERIOD = 0.001
-B = Friction().viscous
 
 
 def needed(
@@ -195,27 +191,6 @@ def needed(
     rendered = (stiffness + damping * speed) * motor
     bound = np.real((1.0 - back) * rendered) * PERIOD / (2.0 * (1.0 - back.real))
     return float(bound.max())
-
-
-def test_the_damping_that_the_page_says_is_needed() -> None:
-    model = STANDARD_MODELS["HM1"]
-    assert (model.damping, model.stiffness) == (1.26, 3.15)
-    # By hand, at the Nyquist rate: with the raw difference K T / 2 + b, with the
-    # filtered speed b g / (2 - g) + K T / 2 with g = 1 - exp(-0.18).
-    assert needed(cutoff=None) == pytest.approx(3.15 * 0.0005 + 1.26, rel=1e-6)
-    assert needed(cutoff=None) > 7.0 * B
-    gain = -math.expm1(-0.18)
-    assert needed() == pytest.approx(1.26 * gain / (2 - gain) + 3.15 * 0.0005, rel=1e-6)
-    assert needed() < B
-    assert needed(cutoff=260.0) < B < needed(cutoff=270.0)
-    late = {"delay": 0.0005, "lag": 0.0005}  # a delay of the motor takes that away
-    assert needed(**late) == pytest.approx(0.222, abs=0.0005)
-    assert needed(cutoff=120.0, **late) < B < needed(**late)
-    # The commanded part is b - 0.9 B; what the device keeps of its own is all of B.
-    assert needed(1.26 - 0.9 * B) == pytest.approx(0.101, abs=0.0005)
-    for words in ("1.262", "0.115", "0.222", "0.101"):
-        assert f"{words} N·m·s/rad" in PAGE
-    assert "260 rad/s" in PAGE
 
 
 @pytest.mark.parametrize(

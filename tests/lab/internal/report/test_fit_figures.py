@@ -86,14 +86,3 @@ def test_residuals_are_those_of_every_sample(found: ElbowFit) -> None:
     together = np.concatenate([slow[1], fast[1]])
     assert np.abs(together).mean() < 0.1  # N·m: the noise that was put in
     assert fast[0].min() < 0.0 < fast[0].max()  # around the catch
-
-
-def test_a_bin_of_few_samples_has_no_mean() -> None:
-    low, high = np.linspace(0.0, 0.01, figures._MIN_IN_BIN), np.array([1.0])
-    middles, means = figures._binned_means(
-        np.concatenate([low, high]), np.append(3.0 + low, 10.0)
-    )
-    width = 1.0 / figures._BINS
-    np.testing.assert_allclose(middles[[0, -1]], [width / 2, 1.0 - width / 2])
-    np.testing.assert_allclose(means[0], 3.005)
-    assert np.isnan(means[1:]).all()

@@ -202,23 +202,6 @@ def test_a_coordinator_without_network_is_told_and_nothing_is_lost(
     assert texts.count(f"In the dark, {stage.rater}") == 1
 
 
-def test_a_rehearsal_is_called_one_and_rates_nothing(stage: Stage) -> None:
-    coordinator, page = stage.coordinator, stage.coordinator.page
-    page.get_by_label("only a rehearsal").check()
-    rater = start(stage)
-    rater.go_until("ready")
-    assert "Rehearsal: nothing of it counts" in rater.text
-    sees(coordinator, "Rehearsal of session test")
-    sees(coordinator, "Rehearsal: nothing of it counts", "#now .label")
-    page.locator("summary", has_text="Log of this rehearsal").click()
-    sees(coordinator, "instructed", "#log")
-    rater.go_until("grade")
-    rater.answer()
-    assert not stage.study.log_file(stage.rater, "test").exists()
-    coordinator.leave()
-    expect(page.locator("#log-title")).to_have_text("Log of this session")
-
-
 def test_the_page_fits_on_a_screen_and_needs_no_mouse(stage: Stage) -> None:
     coordinator = stage.second_coordinator()
     page = coordinator.page
