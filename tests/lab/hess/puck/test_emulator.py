@@ -19,8 +19,7 @@ from tests.lab.hess.puck.rig import (
     release,
 )
 
-VERS, ROLE, STAT = 0, 1, 5
-MODE, T, MT, P, CTS, IPNM = 8, 42, 43, 48, 68, 86
+MODE, T, P = 8, 42, 48
 AT_90_DEG = 19251  # of 77004.8 counts in 360 deg
 
 
