@@ -35,7 +35,7 @@ from masrel.agreement._engine import (
 )
 from masrel.agreement._labels import check_categories, label_codes
 from masrel.agreement.benchmarks import _yekutieli_bounds
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._question import student_t, warn_small
 from masrel.intervals.jackknife import _variance_of
@@ -333,12 +333,12 @@ def _human(
     d = nearer[rated, j]
     n, b, c = len(d), int((d == 1).sum()), int((d == -1).sum())
     way: Any = test
-    if units is not None:
-        way, p = "clusters", p_less_of_clusters(d, units[rated], epsilon)
-    else:
-        if test == "auto":
-            way = "exact" if n <= _EXACT_UP_TO else "score"
+    if test == "auto":
+        way = "exact" if n <= _EXACT_UP_TO else "score"
+    if units is None:
         p = p_less(b, c, n, epsilon, way)
+    else:
+        way, p = "clusters", p_less_of_clusters(d, units[rated], epsilon)
     why = NO_CHANGE if units is None else _NO_CLUSTERS
     reason = undefined(f"the p-value of {name}", why) if math.isnan(p) else None
     return {
@@ -416,20 +416,25 @@ def _graded(
     items, codes, categories = _coded({**graders, **judges}, list(judges), declared)
     is_there = codes >= 0
     does_count = is_there[:, n:].all(axis=1) & (is_there[:, :n].sum(axis=1) >= 2)
-    if not does_count.any():
-        raise RatingsError(
+    refuse(
+        (
+            not does_count.any(),
             f"{listed(judges)}: needs items that two humans have graded, too; none of "
-            f"{len(items)} is, such as {shown(next(iter(items), None))}"
-        )
+            f"{len(items)} is, such as {shown(next(iter(items), None))}",
+        ),
+        error=RatingsError,
+    )
     rated = is_there[does_count, :n]
     n_items = rated.sum(axis=0)
-    if not (n_items >= min_items).any():
-        each = zip(of_humans, n_items.tolist(), strict=True)
-        raise ParameterError(
+    each = zip(of_humans, n_items.tolist(), strict=True)
+    refuse(
+        (
+            not (n_items >= min_items).any(),
             f"min_items: needs a human with at least {min_items} items that another "
             "human and the judge have graded, got "
-            + listed(f"{name} with {n}" for name, n in each)
+            + listed(f"{name} with {n}" for name, n in each),
         )
+    )
     values, nearness = _values(title, codes[does_count], categories, weights)
     return _Graded(
         names=list(of_humans),
@@ -500,11 +505,14 @@ def _values(
     # of equally many others a larger mean square is a larger sum of squares. Grades are
     # made whole numbers, in the proportions of the decimals they are.
     others = [x for x in categories if not isinstance(x, int)]
-    if not all(isinstance(x, float) and math.isfinite(x) for x in others):
-        raise RatingsError(
+    refuse(
+        (
+            not all(isinstance(x, float) and math.isfinite(x) for x in others),
             "score: neg_rmse needs grades that are finite numbers, got "
-            + listed(map(repr, categories))
-        )
+            + listed(map(repr, categories)),
+        ),
+        error=RatingsError,
+    )
     exact = [Fraction(x if isinstance(x, int) else str(x)) for x in categories]
     scale = math.lcm(*(x.denominator for x in exact))
     whole = [int((x - min(exact)) * scale) for x in exact]
@@ -736,8 +744,7 @@ def advantage_differences(
     (0.067, 0.002)
     """
     by_name = {str(name): grades for name, grades in _by_item(judges, "judges").items()}
-    if len(by_name) < 2:
-        raise ParameterError(f"judges: needs at least two, got {len(by_name)}")
+    refuse((len(by_name) < 2, f"judges: needs at least two, got {len(by_name)}"))
     rest = _leave_out(humans, by_name, target, score, min_items, level, clusters)
     names, contrasts = list(by_name), np.eye(len(by_name))
     pairs = list(combinations(range(len(names)), 2))
@@ -798,16 +805,15 @@ def _leave_out(
     check_level(level)
     graded = _graded(humans, judges, score, min_items)
     unit: Unit = "items" if clusters is None else "clusters"
-    lost, df, notes = graded.nearer() == 1, math.inf, list[str]()
-    moved = []
+    lost, moved, fewest = graded.nearer() == 1, [], []
+    notes: tuple[str, ...] = ()
     if target != "raters":
-        without, n_units = _without_units(lost, graded, graded.cluster_codes(clusters))
-        moved, df = [without], n_units - 1.0
-        notes += warn_small(n_units, 10, unit)
+        without, n = _without_units(lost, graded, graded.cluster_codes(clusters))
+        moved, fewest, notes = [without], [n], warn_small(n, 10, unit)
     if target != "items":
-        without = _without_humans(graded, target)
-        moved, df = [*moved, without], min(df, without.shape[1] - 1.0)
-        notes += warn_small(without.shape[1], 5, "humans")
+        moved.append(_without_humans(graded, target))
+        fewest.append(moved[-1].shape[1])
+        notes += warn_small(fewest[-1], 5, "humans")
     words = {"items": unit, "raters": "humans", "both": f"{unit} and humans"}
     interval = Interval(
         low=math.nan,
@@ -818,10 +824,15 @@ def _leave_out(
         target=target,
         unit=unit if target == "items" else target,
         units_are="left out",
-        notes=tuple(notes),
+        notes=notes,
     )
-    values = _advantages(lost, graded)
-    return _LeftOut(graded=graded, values=values, moved=moved, df=df, interval=interval)
+    return _LeftOut(
+        graded=graded,
+        values=_advantages(lost, graded),
+        moved=moved,
+        df=min(fewest) - 1.0,
+        interval=interval,
+    )
 
 
 def _advantages(lost: _Bools, graded: _Graded) -> Floats:
@@ -850,11 +861,13 @@ def _without_units(
 def _without_humans(graded: _Graded, target: Target) -> Floats:
     """Return advantages without each human who was tested, (n_judges, n_humans)."""
     tested = np.flatnonzero(graded.is_tested)
-    if len(tested) < 3:
-        raise ParameterError(
+    refuse(
+        (
+            len(tested) < 3,
             f'target: "{target}" needs at least 3 humans, because one is left out; got '
-            f"{len(tested)}"
+            f"{len(tested)}",
         )
+    )
     rest = []
     for j in tested:  # whom nobody is held against then
         rated = graded.rated & (np.arange(len(graded.names)) != j)
@@ -926,8 +939,10 @@ def reference_difference(
     places = {"human": human, "judge": judge, "reference": reference}
     _, codes, _ = _coded(places, list(places))
     codes = codes[(codes >= 0).all(axis=1)]
-    if not len(codes):
-        raise RatingsError("reference: needs items that human and judge graded, too")
+    refuse(
+        (not len(codes), "reference: needs items that human and judge graded, too"),
+        error=RatingsError,
+    )
     of_human, of_judge = codes[:, 0] == codes[:, 2], codes[:, 1] == codes[:, 2]
     b, c = int((of_judge & ~of_human).sum()), int((of_human & ~of_judge).sum())
     return score_test(b, c, len(codes), delta=-float(epsilon), level=level)

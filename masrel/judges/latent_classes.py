@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linear_sum_assignment
 
-from masrel._input import check_option, listed, shown, warn_caller
+from masrel._input import check_option, listed, refuse, shown, warn_caller
 from masrel.agreement import Label
 from masrel.agreement._engine import Floats, check_level, divide, undefined
 from masrel.agreement._labels import is_missing, label_codes
@@ -228,10 +228,13 @@ def _read(ratings: object) -> _Votes:
     item, rater, grade = zip(*rated, strict=True) if rated else ((), (), ())
     items, item_names = coded(item, "item")
     raters, rater_names = coded(rater, "rater")
-    if len(rater_names) < 2:
-        raise RatingsError(
-            f"ratings: needs grades of at least two raters, got {len(rater_names)}"
-        )
+    refuse(
+        (
+            len(rater_names) < 2,
+            f"ratings: needs grades of at least two raters, got {len(rater_names)}",
+        ),
+        error=RatingsError,
+    )
     grades, categories = label_codes([list(grade)], None, lambda *_: "ratings: grade")
     shape = len(item_names), len(rater_names) * len(categories)
     places = items, raters * len(categories) + grades[0]
@@ -729,9 +732,12 @@ def _read_errors(errors: Any) -> tuple[list[object], Floats]:
         table = np.array(list(rows.values()), dtype=np.float64)
     except (TypeError, ValueError):  # no rows, words, or of several lengths
         rows, table = {}, np.empty((0, 0))
-    if not (2 <= len(table) <= table.shape[1] and np.isin(table, (0, 1)).all()):
-        raise RatingsError(
+    refuse(
+        (
+            not (2 <= len(table) <= table.shape[1] and np.isin(table, (0, 1)).all()),
             "errors: needs one row of 0 and 1 a judge, at least two judges and no "
-            f"fewer items than judges, got {shown(errors)}"
-        )
+            f"fewer items than judges, got {shown(errors)}",
+        ),
+        error=RatingsError,
+    )
     return list(rows), table

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.special import expit
 
-from masrel._input import check_option, listed, shown
+from masrel._input import check_option, listed, refuse, shown
 from masrel.agreement import mcnemar
 from masrel.agreement._engine import NO_SPREAD, Floats, check_level, divide, undefined
 from masrel.agreement._rows import Integers, coded, columns_of
@@ -131,16 +131,16 @@ def position_bias(
             )
         pair[a > b] = 1 + int(of_first if a > b else -of_first)
     both = [pair for pair in verdicts.values() if min(pair) >= 0]
-    if not both:
-        raise RatingsError("ratings: needs pairs in both orders, got none")
+    refuse(
+        (not both, "ratings: needs pairs in both orders, got none"), error=RatingsError
+    )
     table = np.zeros((3, 3), dtype=np.int64)
     np.add.at(table, tuple(np.array(both).T), 1)
     n_pairs, corners = len(both), table[::2, ::2]
     gains, losses = int(np.triu(table, 1).sum()), int(np.tril(table, -1).sum())
     interval = score_test(gains, losses, n_pairs, level=level)
-    notes: tuple[str, ...] = ()
-    if len({key[0] for key in verdicts}) < len(verdicts):
-        notes = ("items have several pairs, which count as if they were independent",)
+    is_several = len({item for item, *_ in verdicts}) < len(verdicts)
+    note = "items have several pairs, which count as if they were independent"
     stays = n_pairs - gains - losses
     return PositionBias(
         table=table,
@@ -154,7 +154,7 @@ def position_bias(
         n_ties=n_pairs - int(corners.sum()),
         n_unpaired=len(verdicts) - n_pairs,
         mcnemar=mcnemar([[stays, gains], [losses, 0]]),
-        notes=notes,
+        notes=(note,) * is_several,
     )
 
 
@@ -172,9 +172,10 @@ def _read(
     items, _ = coded(item, "item")
     models, names = coded([*first, *second], "model")
     a, b = models[: len(first)], models[len(first) :]
-    won = np.array([of == best for of, best in zip(first, winner, strict=True)])
-    tied = np.array([best == tie for best in winner], dtype=bool)
-    return items, a, b, np.where(tied, 0.0, np.where(won, 1.0, -1.0)), names
+    pairs = zip(first, winner, strict=True)
+    # 1 where the first has won, -1 where it has not
+    score = [0.0 if best == tie else 2.0 * (best == of) - 1.0 for of, best in pairs]
+    return items, a, b, np.array(score), names
 
 
 # -- strengths -------------------------------------------------------------------------
@@ -291,8 +292,10 @@ def bradley_terry(
     check_level(level)
     items, first, second, score, models = _read(comparisons, tie)
     used = (score != 0) | (ties == "half")
-    if not used.any():
-        raise RatingsError("ratings: needs verdicts other than ties, got none")
+    refuse(
+        (not used.any(), "ratings: needs verdicts other than ties, got none"),
+        error=RatingsError,
+    )
     n_ties, k = int((score == 0).sum()), len(models)
     items, first, second, score = (of[used] for of in (items, first, second, score))
     wins = np.zeros((k, k))  # of the model in the row
@@ -300,10 +303,10 @@ def bradley_terry(
     np.add.at(wins, (second, first), 0.5 - 0.5 * score)
     reason = _infinite(wins, models)
     strengths = np.full(k, math.nan) if reason else _climb(wins)
-    expected = expit(strengths[first] - strengths[second])
-    sums = np.zeros((items.max() + 1, k))  # slopes of the log-likelihood, by items
-    np.add.at(sums, (items, first), 0.5 + 0.5 * score - expected)
-    np.add.at(sums, (items, second), expected - 0.5 - 0.5 * score)
+    slope = 0.5 + 0.5 * score - expit(strengths[first] - strengths[second])
+    sums = np.zeros((items.max() + 1, k))  # of the log-likelihood, by items
+    np.add.at(sums, (items, first), slope)
+    np.add.at(sums, (items, second), -slope)
     n_items = len(np.unique(items))
     information = _information(wins, strengths)
     inverse = information if reason else np.linalg.pinv(information)  # all are nan
