@@ -325,8 +325,7 @@ def _shifted(plan: Plan, side: int) -> Plan:
 
 def _reaching(plan: Plan) -> Plan:
     # the plan, or the refusal that is its note
-    if plan.reaches_aim is False:
-        raise ParameterError("".join(plan.notes[:1]))
+    refuse((plan.reaches_aim is False, "".join(plan.notes[:1])))
     return plan
 
 
@@ -450,11 +449,13 @@ class _Search:
     def _affordable_size(self) -> int:
         limit = self.design.study.max_cost or 0.0
         n = self.affordable(limit)
-        if n in (0, self.highest):
-            raise ParameterError(
+        refuse(
+            (
+                n in (0, self.highest),
                 f"max_cost: needs a limit between {self.cost(self.lowest):g}, of the "
-                f"smallest study, and what some study costs; got {limit:g}"
+                f"smallest study, and what some study costs; got {limit:g}",
             )
+        )
         return n
 
 
@@ -492,12 +493,14 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
                 limit, is_counted = plan.cost * _CHEAPER, True
         else:
             n_worse += is_counted
-    if best.reaches_aim is False:
-        raise ParameterError(
+    refuse(
+        (
+            best.reaches_aim is False,
             f"max_cost: {aim_words(study)[1]} is not reached for {limit:g}; the best "
             f"that can be had is {best.n_items} items and {best.n_raters} raters, "
-            f"which cost {best.cost:g} and reach {reached_words(study, best)}"
+            f"which cost {best.cost:g} and reach {reached_words(study, best)}",
         )
+    )
     return best
 
 

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtr, fdtri, gammaln, ndtri, stdtrit
 
+from masrel._input import refuse
 from masrel.agreement import CodedRatings
 from masrel.agreement._profile import profile_ends
-from masrel.errors import MasrelWarning, ParameterError
+from masrel.errors import MasrelWarning
 from masrel.intervals import estimate
 from masrel.planning._study_plan import Progress, limits_of
 from masrel.planning._truth import (
@@ -27,8 +28,6 @@ from masrel.planning._truth import (
     Design,
     Floats,
     Integers,
-    places_of,
-    rows_of,
 )
 
 # numbers, their Monte Carlo errors, and how many studies were drawn
@@ -63,11 +62,13 @@ def shown(design: Design, progress: Progress | None = None) -> Shown:
         return _drawn(design, progress)
     if design.is_icc and design.study.coefficient != AGREEMENT:
         return _exact_icc(design), {}, 0
-    if design.n_tables > 20 * MAX_TABLES:
-        raise ParameterError(
+    refuse(
+        (
+            design.n_tables > 20 * MAX_TABLES,
             'method: "exact" sums over all studies that differ, of which there are '
-            f'{design.n_tables:g}; "simulation" draws some of them'
+            f'{design.n_tables:g}; "simulation" draws some of them',
         )
+    )
     total = np.zeros((3, len(NUMBERS)))
     for freq, p in all_studies(design.n_items, design.p):
         total += _moments(design, outcomes_of(design, design.rows, freq), p)
@@ -110,23 +111,9 @@ def simulated(design: Design, rng: np.random.Generator, n_studies: int) -> Float
             freq = rng.multinomial(design.n_items, design.p, size=n)
             outcomes = outcomes_of(design, design.rows, freq)
         else:
-            outcomes = outcomes_of(design, *_counted(design, draw(design, rng, n)))
+            outcomes = outcomes_of(design, draw(design, rng, n))
         total += _moments(design, outcomes, np.ones(n))
     return total
-
-
-def _counted(design: Design, codes: Integers) -> tuple[Integers, Integers | None]:
-    """Return the distinct rows of drawn ratings, and how often studies have each."""
-    # codes (n_studies, n_items, n_columns) -> as `outcomes_of` takes them
-    n, n_items, n_columns = codes.shape
-    least = -int(design.model.p_missing > 0.0)
-    n_rows = (len(design.model.scale) - least) ** n_columns
-    if design.is_chosen or n_rows > n_items * n_columns:  # more than there are ratings
-        return codes, None
-    # the place of a row among those of all studies
-    places = places_of(design.model, codes) + n_rows * np.arange(n)[:, None]
-    freq = np.bincount(places.ravel(), minlength=n * n_rows).reshape(n, n_rows)
-    return rows_of(design.model, n_columns, ordered=True), freq
 
 
 def draw(design: Design, rng: np.random.Generator, n: int) -> Integers:
@@ -148,13 +135,12 @@ def outcomes_of(
     """Return half-width, low and high of studies, (n_studies, 3)."""
     # ratings of each (n_studies, n_items, n_columns), or how often each distinct row
     # (n_rows, n_columns) occurs in it (n_studies, n_rows)
-    if not design.is_chosen:
-        weight = np.ones(codes.shape[:2]) if freq is None else freq.astype(np.float64)
-        return (_raters_left_out if design.leaves_raters_out else _wald)(
-            design, weight, codes
-        )
-    studies = codes if freq is None else [codes.repeat(row, axis=0) for row in freq]
-    return np.array([_chosen(design, study) for study in studies]).reshape(-1, 3)
+    if design.is_chosen:
+        studies = codes if freq is None else [codes.repeat(row, axis=0) for row in freq]
+        return np.array([_chosen(design, of) for of in studies]).reshape(-1, 3)
+    weight = np.ones(codes.shape[:2]) if freq is None else freq.astype(np.float64)
+    found = _raters_left_out if design.leaves_raters_out else _wald
+    return found(design, weight, codes)
 
 
 @np.errstate(invalid="ignore")  # 0/0 where a study has no coefficient

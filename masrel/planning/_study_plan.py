@@ -13,7 +13,7 @@ import numpy as np
 
 from masrel._input import refuse, shown
 from masrel.agreement import Label, WeightsLike, code_ratings
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.errors import RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, IntervalMethod, Target
 from masrel.intervals import estimate
 
@@ -184,8 +184,7 @@ class Study:
             value = getattr(self, name)
             is_absent = value is None and name not in _ALWAYS
             is_right = is_absent or (isinstance(value, of_kind) and holds(value))
-            if not is_right:
-                raise ParameterError(f"{name}: needs {needed}, got {shown(value)}")
+            refuse((not is_right, f"{name}: needs {needed}, got {shown(value)}"))
         is_of_items = self.interval in _OF_ITEMS_ALONE and self.target != "items"
         refuse(
             (
@@ -551,8 +550,8 @@ def pilot(
         result = estimate(
             coefficient, coded, target=target, weights=weights, level=level
         )
-    if result.reason is not None:
-        raise RatingsError(f"pilot: {coefficient} is undefined in it: {result.reason}")
+    why = f"pilot: {coefficient} is undefined in it: {result.reason}"
+    refuse((result.reason is not None, why), error=RatingsError)
     codes = coded.codes
     counts = np.bincount(codes[codes >= 0], minlength=len(coded.categories))
     return Pilot(

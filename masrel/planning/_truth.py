@@ -82,12 +82,14 @@ def declared_model(study: Study) -> ItemModel:
             latent=study.model,
             p_missing=study.p_missing,
         )
-    name, known = str(study.model), ", ".join(MODELS)
-    if name not in MODELS:
-        raise ParameterError(
-            f"model: needs one of {known}, or a LatentModel, since models of one kappa "
-            f"differ in precision; got {shown(study.model)}"
+    name = str(study.model)
+    refuse(
+        (
+            name not in MODELS,
+            f"model: needs one of {', '.join(MODELS)}, or a LatentModel, since models "
+            f"of one kappa differ in precision; got {shown(study.model)}",
         )
+    )
     shares = _shares(study, is_table=name == "table")
     is_table = shares.ndim == 2
     margins = 0.5 * (shares.sum(axis=0) + shares.sum(axis=1)) if is_table else shares
@@ -165,14 +167,6 @@ def rows_of(model: ItemModel, n_raters: int, *, ordered: bool) -> Integers:
         return every.T + least
     rows = itertools.combinations_with_replacement(range(least, q), n_raters)
     return np.array(list(rows), dtype=np.int64).reshape(-1, n_raters)
-
-
-def places_of(model: ItemModel, codes: Integers) -> Integers:
-    """Return where ratings, (…, n_raters), are among all ordered rows, (…)."""
-    least = -int(model.p_missing > 0.0)
-    shape = (len(model.scale) - least,) * codes.shape[-1]
-    places = np.ravel_multi_index(tuple(np.moveaxis(codes - least, -1, 0)), shape)
-    return np.asarray(places, dtype=np.int64)
 
 
 def probabilities(model: ItemModel, rows: Integers, *, ordered: bool) -> Floats:
@@ -325,8 +319,7 @@ class Design:
     @property
     def ordered(self) -> bool:
         """Whether it matters which rater gave which rating."""
-        tells_apart = self.entry.raters_matter
-        return self.model.name == "table" or tells_apart
+        return self.model.name == "table" or self.entry.raters_matter
 
     @property
     def has_rows(self) -> bool:
@@ -444,7 +437,10 @@ class Design:
             return self.problem.features(rows).reshape(*codes.shape[:-1], -1)
         # items of many studies: those of every row once
         every = rows_of(self.model, n_raters, ordered=True)
-        return self.problem.features(every)[places_of(self.model, codes)]
+        least = -int(self.model.p_missing > 0.0)
+        shape = (len(self.model.scale) - least,) * n_raters
+        places = np.ravel_multi_index(tuple(np.moveaxis(codes - least, -1, 0)), shape)
+        return np.asarray(self.problem.features(every)[places])
 
     @np.errstate(invalid="ignore")  # 0/0 where there is no coefficient
     def population(self) -> tuple[float, float]:
@@ -475,11 +471,13 @@ def design_of(study: Study) -> Design:
         _check_normal(study, entry)
         design = Design.of(study, ItemModel(name="normal"))
     else:
-        if entry.formula is None or entry.has_interval:
-            raise ParameterError(
+        refuse(
+            (
+                entry.formula is None or entry.has_interval,
                 f"coefficient: {entry.title} cannot be planned for: it is no function "
-                f"of sums over items; the others and {', '.join(FORMS)} can"
+                f"of sums over items; the others and {', '.join(FORMS)} can",
             )
+        )
         design = _with_value(Design.of(study, declared_model(study)))
     value, null, lower, upper = design.value, study.null, study.lower, study.upper
     refuse(
@@ -562,8 +560,7 @@ def _with_value(design: Design) -> Design:
             )
         )
         return Design.of(replace(study, value=implied), design.model)
-    if value is None:
-        raise ParameterError("value: needs the true coefficient, got none")
+    refuse((value is None, "value: needs the true coefficient, got none"))
     return at_value(design, design.value)
 
 

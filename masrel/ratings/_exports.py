@@ -22,7 +22,7 @@ import pandas as pd
 
 from masrel._input import USUAL_NAMES, refuse, shown
 from masrel.agreement._labels import is_row
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.ratings._findings import (
     Finding,
     Reading,
@@ -81,8 +81,10 @@ _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes th
 def read_table(data: Any, options: Reading) -> tuple[Sheet, Reading]:
     """Return the cells of a table in memory, and how they are read."""
     facts = {"format": type(data).__name__}
-    of_text = ("delimiter", "encoding", "skip", "header")
-    of_files = (*of_text, "sheet", "source", "stream")
+    of_files = (
+        *("delimiter", "encoding", "skip", "header"),
+        *("sheet", "source", "stream"),
+    )
     refuse(
         *(
             (getattr(options, name), f"--{name}: is of files, got a {facts['format']}")
@@ -97,8 +99,8 @@ def read_table(data: Any, options: Reading) -> tuple[Sheet, Reading]:
     # columns that nobody named
     cells = [column_of(_TABLE, str(k), frame.iloc[:1, k]) for k in frame.columns]
     first = ["".join(column.texts) for column in cells]
-    has_items = bool(options.item or options.rater or options.grade)
-    no_item = options.no_item or (is_array and not has_items)
+    are_named = options.item or options.rater or options.grade
+    no_item = options.no_item or (is_array and not are_named)
     options = replace(options, no_header=True, no_item=no_item)
     return sheet_of(_TABLE, str, frame[1:].set_axis(first, axis=1), facts), options
 
@@ -180,13 +182,17 @@ def read_typed(
 ) -> Sheet:
     """Read a file whose cells have types, or the export of an annotation tool."""
     facts: dict[str, Any] = {"format": suffix.removeprefix(".")}
-    if options.encoding is not None and suffix not in _ENCODED:
-        raise ParameterError(
-            f"--encoding: needed a file of text, got {facts['format']}, whose is known"
-        )
     source, extras = options.source, dict[str, Any]()
-    if source not in (None, *TOOLS):
-        raise ParameterError(f"--from: needed {', '.join(TOOLS)}, got {source!r}")
+    refuse(
+        (
+            options.encoding is not None and suffix not in _ENCODED,
+            f"--encoding: needed a file of text, got {facts['format']}, whose is known",
+        ),
+        (
+            source not in (None, *TOOLS),
+            f"--from: needed {', '.join(TOOLS)}, got {source!r}",
+        ),
+    )
     is_json = source is None and suffix in (".json", ".jsonl")
     values = _json_values(name, suffix, data) if is_json else []
     records = [*_within(values)]
@@ -194,8 +200,11 @@ def read_typed(
         is_log = suffix == ".eval"
         source = "inspect-ai" if is_log else _recognized(name, records, options)
     if source is not None:
-        placed = (("", each) for each in records) if is_json else None
-        export = placed or _records(name, suffix, data, source)
+        export = (
+            [("", record) for record in records]
+            if is_json
+            else _records(name, suffix, data, source)
+        )
         frame, facts, extras = _export(name, source, export, options.grade)
     elif suffix in WORKBOOKS:
         rows, n_above = _workbook(name, suffix, data, options.sheet, facts)
@@ -247,8 +256,9 @@ def column_of(name: str, title: str, values: "pd.Series[Any]") -> Column:
     kinds = list(map(type, values)) if values.dtype == object else []
     for number, kind in enumerate(kinds, start=1):
         if kind in (list, dict, set, np.ndarray):
-            facts = {"column": title, "number": number, "kind": kind.__name__}
-            raise refusal(name, "nested cell", **facts)
+            raise refusal(
+                name, "nested cell", column=title, number=number, kind=kind.__name__
+            )
     if {bool, np.bool_} & set(kinds):  # True equals 1 in Python, and is another grade
         values = values.map(value_text, na_action="ignore")
     codes, known = pd.factorize(values, use_na_sentinel=True)
@@ -279,8 +289,9 @@ def _workbook(
     open_book = partial(calamine.CalamineWorkbook.from_filelike, io.BytesIO(data))
     book = read_foreign(name, suffix, open_book, calamine.CalamineError)
     if chosen is not None and chosen not in book.sheet_names:
-        known = ", ".join(book.sheet_names)
-        raise refusal(name, "no sheet", sheet=chosen, sheets=known)
+        raise refusal(
+            name, "no sheet", sheet=chosen, sheets=", ".join(book.sheet_names)
+        )
     filled = {}
     for title in book.sheet_names if chosen is None else [chosen]:
         read = partial(book.get_sheet_by_name, title)
@@ -592,28 +603,27 @@ def _export(
         raise refusal(name, "fields", fields=", ".join(fields), got=got)
     if chosen in ("item", "rater"):
         raise refusal(name, "field's name", chosen=chosen)
-    used, dropped = [], Counter[str]()
-    for who in annotations:
-        if who.why or (tool.is_split and of not in who.grades):
-            dropped[who.why or "of other fields"] += 1
-        else:
-            used.append(who)
+    others = "of other fields" if tool.is_split else ""
+    why = [who.why or others * (of not in who.grades) for who in annotations]
+    used = [who for who, lost in zip(annotations, why, strict=True) if not lost]
     if not used:
         raise refusal(name, "no rating", field=of)
     used = _by_kind(used)
     names = ["item", "rater", chosen or "grade", "text", "cluster"]
     rows = [_row(name, who, of) for who in used]
     frame = pd.DataFrame(rows, columns=names, dtype=object)
-    is_there = [*frame.notna().any()]
     is_there = [
-        k < 3 or (is_so and names[k] != chosen) for k, is_so in enumerate(is_there)
+        k < 3 or (is_so and names[k] != chosen)
+        for k, is_so in enumerate(frame.notna().any())
     ]
     facts: dict[str, Any] = {"format": f"{source} export", "field": of}
     if kinds := {str(who.rater): who.kind for who in used if who.kind}:
         facts["kinds"] = kinds
     notes = Counter(who.note for who in used if who.note)
-    findings = tuple(Finding(note, n=n) for note, n in notes.items())
-    extras = {"dropped": dict(dropped), "findings": findings}
+    extras = {
+        "dropped": dict(Counter(filter(None, why))),
+        "findings": tuple(Finding(note, n=n) for note, n in notes.items()),
+    }
     return frame.loc[:, is_there], facts, extras
 
 
