@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import CodedRatings, Coefficient, Significance, code_ratings, holm
 from masrel.analysis._file_estimates import (
     Answer,
@@ -23,7 +24,7 @@ from masrel.analysis._file_estimates import (
     parts_of,
     placed,
 )
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.estimates import as_document
 from masrel.ratings import RatingsFile, RatingsPart
 
@@ -50,8 +51,8 @@ def _groups_of(name: str, parts: Sequence[RatingsPart]) -> _Groups:
     # name: the file's
     with placed(name):
         coded = [code_ratings(part.ratings) for part in parts]
-    rated = [_rated_rows(*both) for both in zip(parts, coded, strict=True)]
-    items = [frozenset(rows) for rows in rated]
+    rated = list(map(_rated_rows, parts, coded))
+    items = list(map(frozenset, rated))
     n_shared = len(frozenset.intersection(*items))
     has_clusters = any(part.clusters for part in parts)
     of_parts = [set(part.clusters) for part in parts]
@@ -108,11 +109,13 @@ def _difference_rows(
     file: RatingsFile, coefficients: Sequence[Coefficient], questions: Questions
 ) -> Answer:
     name, by = file.read["file"], file.read["by"]
-    if len(file.parts) < 2:
-        raise ParameterError(
+    refuse(
+        (
+            len(file.parts) < 2,
             "--by: needs a column that tells two groups or more apart, "
-            + ("or --by-criterion" if by is None else f"{by!r} has one")
+            + ("or --by-criterion" if by is None else f"{by!r} has one"),
         )
+    )
     pairs = {
         (first, second): _groups_of(name, (one, other))
         for (one, first, _), (other, second, _) in itertools.combinations(
@@ -182,12 +185,11 @@ def _differences(
             "test_reason": test.reason,
         }
         interval = estimate.interval
-        why = () if test.reason is None else (f"undefined: {test.reason}",)
         cells = {
             "title": questions.title(entry),
             "group": f"{first} and {second}",
             "items": "the same" if groups.same_items else "others",
-            "texts": why,
+            "texts": () if test.reason is None else (f"undefined: {test.reason}",),
             "interval_texts": () if interval is None else interval.notes,
             # ``nan`` where they are undefined
             "difference": estimate.value,

@@ -483,11 +483,13 @@ def entries(
             and (file.is_ordered or not entry.needs_order)
         ]
     for entry in fitting:
-        if entry.shape == "pairs":
-            raise ParameterError(
+        refuse(
+            (
+                entry.shape == "pairs",
                 f"--coefficients: {entry.name} takes each rater's grades of two "
-                "sessions: --session COL --retest computes it"
+                "sessions: --session COL --retest computes it",
             )
+        )
         if entry.needs_order:
             check_order(file, entry.name)
     return fitting
@@ -495,11 +497,13 @@ def entries(
 
 def check_order(file: "RatingsFile", what: str) -> None:
     """Refuse what needs the order of grades, where it is the alphabet's alone."""
-    if not file.is_ordered:
-        raise ParameterError(
+    refuse(
+        (
+            not file.is_ordered,
             f"{what}: needs grades that are numbers or --categories with every grade "
-            f"in order, the grades met are text: {listed(file.scale.grades)}"
+            f"in order, the grades met are text: {listed(file.scale.grades)}",
         )
+    )
 
 
 def on_grades(ratings: _Ratings, entry: "Coefficient", file: "RatingsFile") -> _Ratings:
@@ -528,9 +532,10 @@ def estimate_row(
     notes = []
     is_unweighted = questions.weights != questions.weights_of(entry)
     if is_unweighted and not questions.takes_all:
-        by_metric = f"by its metric, without {questions.weights} weights"
         notes.append(
-            by_metric if entry.metric else "unweighted, there are no weights for it"
+            f"by its metric, without {questions.weights} weights"
+            if entry.metric
+            else "unweighted, there are no weights for it"
         )
     try:
         estimate = _estimate(entry, ratings, questions, questions.level)

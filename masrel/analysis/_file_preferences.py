@@ -6,12 +6,19 @@ answers preferred. Out: rows of judges, and of the answers that each preferred.
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from masrel._input import listed, refuse
 from masrel.agreement import code_ratings
 from masrel.analysis._file_estimates import Answer, Questions, Row, note, placed
 from masrel.errors import RatingsError
 from masrel.judges import bradley_terry, position_bias
 from masrel.ratings import RatingsFile
+
+_OF_BIAS = (
+    *("value", "low", "high", "level", "agreement", "agreement_without_ties"),
+    *("n_pairs", "n_ties", "n_unpaired"),
+)
 
 _Verdict = tuple[str, str, str, str]  # item, shown first, shown second, preferred
 
@@ -29,32 +36,41 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
         with placed(file.read["file"], judge):
             bias = position_bias(verdicts[judge], tie=tie, level=questions.level)
             fit = bradley_terry(verdicts[judge], tie=tie, level=questions.level)
-        keys = ("value", "low", "high", "level", "agreement", "agreement_without_ties")
-        counts = ("n_pairs", "n_ties", "n_unpaired")
-        row = {"judge": judge, **{of: getattr(bias, of) for of in (*keys, *counts)}}
-        biases.append(row | {"p_value": bias.mcnemar.p_value, "notes": bias.notes})
-        ends = zip(fit.models, fit.strengths, fit.low, fit.high, strict=True)
-        for model, value, low, high in ends:
-            of_model = {"judge": judge, "model": model, "value": float(value)}
-            of_ends = {"low": float(low), "high": float(high), "reason": fit.reason}
-            strengths.append({**of_model, **of_ends, "notes": fit.notes})
-    level = questions.level
-    several = {
-        "preferences": (
-            biases,
-            note("position", level=level, ties=f" A tie is {tie!r}." if tie else ""),
-        ),
-        "strengths": (strengths, note("strengths", level=level)),
-    }
-    for name, (rows, below) in several.items():
-        shown = [_shown(row) for row in rows]
-        yield Answer(name=name, rows=rows, shown=shown, notes=(below,))
+        row = {
+            "judge": judge,
+            **{of: getattr(bias, of) for of in _OF_BIAS},
+            "p_value": bias.mcnemar.p_value,
+            "notes": bias.notes,
+        }
+        biases.append(row)
+        numbers = np.array([fit.strengths, fit.low, fit.high]).T.tolist()
+        strengths += [
+            {
+                "judge": judge,
+                "model": model,
+                **dict(zip(("value", "low", "high"), of_model, strict=True)),
+                "reason": fit.reason,
+                "notes": fit.notes,
+            }
+            for model, of_model in zip(fit.models, numbers, strict=True)
+        ]
+    ties = f" A tie is {tie!r}." if tie else ""
+    for name, kind, rows in (
+        ("preferences", "position", biases),
+        ("strengths", "strengths", strengths),
+    ):
+        yield Answer(
+            name=name,
+            rows=rows,
+            shown=list(map(_shown, rows)),
+            notes=(note(kind, level=questions.level, ties=ties),),
+        )
 
 
 def _shown(row: Row) -> Row:
     reason = row.get("reason")
     why = [] if reason is None else [f"undefined: {reason}"]
-    texts = [*why, *row.get("notes", ())]
+    texts = [*why, *row["notes"]]
     return {**row, "title": row["judge"], "group": "", "texts": texts}
 
 

@@ -55,7 +55,6 @@ from masrel.analysis._file_estimates import (
 )
 from masrel.errors import (
     MasrelWarning,
-    ParameterError,
     RatingsError,
     UndefinedStatisticWarning,
 )
@@ -90,9 +89,8 @@ def answers(
         )
     if questions.weights != "identity" and not isinstance(questions.weights, Weights):
         check_order(file, f"--weights {questions.weights}")
-    others = file
-    if questions.reference is not None:
-        others = _without_reference(file, questions.reference)
+    reference = questions.reference
+    others = file if reference is None else _without_reference(file, reference)
     between = questions.between_raters(others)
     # Every note is in a result, and so below its table or in the JSON.
     with warnings.catch_warnings(action="ignore", category=MasrelWarning):
@@ -114,10 +112,8 @@ def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
         with placed(file.read["file"]):
             coded = code_ratings(part.ratings)
         others = [place for place, name in enumerate(part.raters) if name != reference]
-        if len(others) == len(part.raters):
-            raise ParameterError(
-                f"--reference: needs one of {', '.join(part.raters)}, got {reference!r}"
-            )
+        needed = f"needs one of {', '.join(part.raters)}, got {reference!r}"
+        refuse((reference not in part.raters, f"--reference: {needed}"))
         raters = tuple(part.raters[place] for place in others)
         ratings = replace(coded, codes=coded.codes[:, others])
         parts.append(replace(part, raters=raters, ratings=ratings))
@@ -194,11 +190,14 @@ def _retest(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
         parts = [part for part in file.parts if part.group == group]
         names = [str(part.session) for part in parts]
         with placed("--retest", group):
-            if len(parts) != 2:
-                raise RatingsError(
+            refuse(
+                (
+                    len(parts) != 2,
                     f"needs two sessions in column {column!r}, got {len(names)} "
-                    f"({listed(names)})"
-                )
+                    f"({listed(names)})",
+                ),
+                error=RatingsError,
+            )
             pairs, raters, lone = _both_sessions(parts, file.scale.values)
         keys = {} if by is None else dict.fromkeys(heads_of(by), group)
         estimates += _retest_rows(keys, raters, pairs, questions)
@@ -231,12 +230,15 @@ def _both_sessions(
     for noun in ("rater", "item"):
         names = [dict.fromkeys(getattr(part, f"{noun}s")) for part in parts]
         both[noun] = [name for name in names[0] if name in names[1]]
-        if not both[noun]:
-            article = "an" if noun == "item" else "a"
-            raise RatingsError(
-                f"needs {article} {noun} of both sessions, got {listed(names[0])} in "
-                f"{parts[0].session!r} and {listed(names[1])} in {parts[1].session!r}"
-            )
+        refuse(
+            (
+                not both[noun],
+                f"needs {'an' if noun == 'item' else 'a'} {noun} of both sessions, got "
+                f"{listed(names[0])} in {parts[0].session!r} and {listed(names[1])} in "
+                f"{parts[1].session!r}",
+            ),
+            error=RatingsError,
+        )
         for part, mine, others in zip(parts, names, names[::-1], strict=True):
             if left := [name for name in mine if name not in others]:
                 lone.append(f"{noun} {listed(left)} ({part.session} only)")
@@ -263,14 +265,14 @@ def _retest_rows(
     rows = []
     for place, rater in enumerate(raters):
         ratings = replace(pairs, codes=pairs.codes[:, 2 * place : 2 * place + 2])
-        keys = {**names, "rater": rater}
-        row = estimate_row(coefficient("cohen_kappa"), ratings, keys, alone)
+        row = estimate_row(
+            coefficient("cohen_kappa"), ratings, {**names, "rater": rater}, alone
+        )
         estimate = replace(row.estimate, n_raters=min(row.estimate.n_raters, 1))
         rows.append(replace(row, estimate=estimate))
     is_pooled = questions.takes_all or "pooled_kappa" in questions.names
-    everybody = {**names, "rater": None}
     return rows + [
-        estimate_row(coefficient(name), pairs, everybody, every)
+        estimate_row(coefficient(name), pairs, {**names, "rater": None}, every)
         for name in ("stratified_kappa", *["pooled_kappa"] * is_pooled)
     ]
 
@@ -280,11 +282,14 @@ def _retest_rows(
 
 def _two_raters(part: RatingsPart) -> CodedRatings:
     coded = code_ratings(part.ratings)
-    if coded.codes.shape[1] != 2:
-        raise RatingsError(
+    refuse(
+        (
+            coded.codes.shape[1] != 2,
             f"needs two raters, got {coded.codes.shape[1]} "
-            f"({listed(part.raters)}); --raters chooses two"
-        )
+            f"({listed(part.raters)}); --raters chooses two",
+        ),
+        error=RatingsError,
+    )
     return coded
 
 
@@ -340,12 +345,11 @@ def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
         }
     for title, result in tests.items():
         name, _, kind = title.partition(", ")
-        key = name.lower().replace("-", "_")
         why = result.reason
         if why is None and math.isinf(result.statistic):
             why = "infinite: all items changed, and one way"
         row = {
-            "test": key,
+            "test": name.lower().replace("-", "_"),
             "kind": kind or None,
             **{of: getattr(result, of) for of in _OF_TEST},
             "reason": why,
@@ -371,15 +375,20 @@ _OF_TABLE = {
 
 def _of_margins(grades: Sequence[str], part: RatingsPart) -> Iterator[tuple[Row, Row]]:
     table = contingency_table(_two_raters(part))
-    if len(grades) != 2:
-        raise RatingsError(
-            f"needs a scale of two categories, got {len(grades)} ({listed(grades)})"
-        )
+    refuse(
+        (
+            len(grades) != 2,
+            f"needs a scale of two categories, got {len(grades)} ({listed(grades)})",
+        ),
+        error=RatingsError,
+    )
 
     of_all, why = _with_reason(lambda: brennan_prediger(part.counted))
-    error = of_all.standard_error
     indices: list[tuple[str, str, float, str | None, Row]] = [
-        ("pabak", "PABAK", of_all.value, why, {"standard_error": error})
+        (
+            *("pabak", "PABAK", of_all.value, why),
+            {"standard_error": of_all.standard_error},
+        )
     ]
     indices += [
         (name, title, *_with_reason(partial(function, table)), {})
@@ -446,7 +455,7 @@ def _limits(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
         yield row, *cells
 
     answer = _table("limits_of_agreement", file, rows_of)
-    pairs = [f"{row['first']} less {row['second']}" for row in answer.rows]
+    pairs = (f"{row['first']} less {row['second']}" for row in answer.rows)
     notes = [note("pair", pair=pair) for pair in dict.fromkeys(pairs)]
     groups = (group for _, group, _ in parts_of(file))
     yield replace(
@@ -466,9 +475,9 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
 
     if questions.coefficients is None and questions.metric is None:
         questions = replace(questions, coefficients=["fleiss_kappa"])
-    if questions.takes_all or len(questions.names) > 1:
-        names = ",".join(questions.names)
-        raise ParameterError(f"--coefficients: needs one coefficient, got {names}")
+    is_several = questions.takes_all or len(questions.names) > 1
+    names = ",".join(questions.names)
+    refuse((is_several, f"--coefficients: needs one coefficient, got {names}"))
     (entry,) = entries(questions, file, file.parts)
     title, grades = questions.title(entry), file.scale.grades
     parts = []
@@ -494,7 +503,7 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     for kind, texts in notes.items():
         shown = [
             {"group": group, **row}
-            for group, _, _, rows in parts
+            for group, *_, rows in parts
             for row in rows.get(f"{kind}_shown", rows[kind])
         ]
         if kind == "pairs" and len(parts[0][2].raters) > _MANY:
@@ -507,7 +516,6 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
             for key in ("change", "standard_error", "agreement")
             if any(row.get(key) is not None for row in shown)
         ]
-        panels = [(group, result) for group, _, result, _ in parts]
         yield Answer(
             name=f"diagnosis_{kind}",
             rows=[{**keys, **row} for _, keys, _, rows in parts for row in rows[kind]],
@@ -516,7 +524,9 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
             notes=(*explained, *texts),
             of=of.get(kind, ""),
             grades=grades if kind == "confusion" else (),
-            figure=tuple(panels) if kind == "pairs" else (),
+            figure=tuple((group, result) for group, _, result, _ in parts)
+            if kind == "pairs"
+            else (),
         )
 
 

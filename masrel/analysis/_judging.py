@@ -1,7 +1,7 @@
 """What is asked about the judges among the raters of a file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Literal
 
 from masrel._input import refuse
@@ -76,5 +76,4 @@ class Judging:
 
     def record(self) -> dict[str, object]:
         """Return every option that decides a number."""
-        of_all = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {**of_all, "epsilon": self.margin}
+        return {**asdict(self), "epsilon": self.margin}
