@@ -12,7 +12,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from itertools import chain, compress
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -330,13 +330,10 @@ def _sheet_of_rows(
         Row(k, k, [*compress(_texts(row), is_used)])
         for k, row in enumerate(rows[first : first + SNIFFED], n_above + first + 1)
     ]
-    findings = []
-    if note:
-        where = f"row {n_above + len(rows) + 1}"
-        findings.append(Finding("note below", where=where, got=note[:60]))
-    if errors := facts.get("errors"):
-        shown = ", ".join(f"{text} ×{n}" for text, n in errors.items())
-        findings.append(Finding("errors", errors=shown))
+    where = f"row {n_above + len(rows) + 1}"
+    findings = [Finding("note below", where=where, got=note[:60])] if note else []
+    if errors := ", ".join(f"{e} ×{n}" for e, n in facts.get("errors", {}).items()):
+        findings.append(Finding("errors", errors=errors))
     frame = frame.loc[:, is_used][1:].set_axis(names, axis=1)
     return replace(
         sheet_of(name, sha256, frame, facts, n_above + first),
@@ -463,8 +460,7 @@ def _annotated(
     for number, record in enumerate(values, start=1):
         item = next((record[key] for key in _ID if key in record), number)
         of = next((record[key] for key in _GIVEN if key in record), ())
-        raters = record.get("annotators", record.get("raters"))
-        pairs = _pairs(name, item, raters, of)
+        pairs = _pairs(name, item, record.get("annotators", record.get("raters")), of)
         if pairs is not None:
             rows += [{"item": item, "rater": who, "grade": got} for who, got in pairs]
         elif isinstance(of, dict):
@@ -512,8 +508,12 @@ def _two_levels(
     if not are_items and len(outer) <= len(inner):
         raters, items, table = outer, inner, zip(*table, strict=True)
     if len(raters) >= len(items) and not (options.raters or options.transpose):
-        names, others = few([*map(str, raters)]), listed([*map(str, items)], 5)
-        raise refusal(name, "levels", raters=names, others=others)
+        raise refusal(
+            name,
+            "levels",
+            raters=few([*map(str, raters)]),
+            others=listed([*map(str, items)], 5),
+        )
     rows = [[item, *row] for item, row in zip(items, table, strict=True)]
     return pd.DataFrame(rows, columns=["item", *raters], dtype=object)
 
@@ -526,15 +526,12 @@ _WITHIN = (("samples",), ("results", "results"), ("traces",), ("data",))
 
 def _within(values: list[Any]) -> Iterator[Any]:
     for value in values:
-        for path in _WITHIN:
-            inner = value
-            for key in path:
-                inner = inner.get(key) if isinstance(inner, dict) else None
-            if isinstance(inner, list):
-                yield from inner
-                break
-        else:
-            yield value
+        found = (reduce(_inner, path, value) for path in _WITHIN)
+        yield from next((of for of in found if isinstance(of, list)), [value])
+
+
+def _inner(value: Any, key: str) -> Any:
+    return value.get(key) if isinstance(value, dict) else None
 
 
 def _recognized(name: str, records: list[Any], options: Reading) -> str | None:

@@ -75,8 +75,7 @@ def _labels(value: Any) -> Any:
 
 def _doccano(path: str, example: _Record) -> Iterator[Annotation]:
     # the labels of an example; in an archive is a file of each annotator
-    who = example.get("user", PurePosixPath(path).name)
-    rater = example.get("username", who)
+    rater = example.get("username", example.get("user", PurePosixPath(path).name))
     text = example.get("text", example.get("filename"))
     keys = {"label", "labels", "cats"} & example.keys()
     if keys:
@@ -174,11 +173,14 @@ def _promptfoo(_: str, row: _Record) -> Iterator[Annotation]:
     # an output's grades by assertions, and those of its test by provider
     test, is_error = row["testIdx"], row.get("failureReason") == 2
     prompt = str(row.get("promptId", row["promptIdx"]))[:8]  # of all providers
-    passed = {"success": None if is_error else row["success"]}
     named = {} if is_error else row.get("namedScores") or {}
-    provider = row["provider"]["id"]
-    grades = {**passed, **named}
-    yield Annotation(f"{test}/{prompt}", provider, grades, kind="model", cluster=test)
+    yield Annotation(
+        f"{test}/{prompt}",
+        row["provider"]["id"],
+        {"success": None if is_error else row["success"], **named},
+        kind="model",
+        cluster=test,
+    )
     graded = {} if is_error else row.get("gradingResult") or {}
     n_before = Counter[str]()
     for part in graded.get("componentResults") or ():
@@ -205,8 +207,7 @@ def _mlflow(_: str, trace: _Record) -> Iterator[Annotation]:
     assessments = info["assessments"] or ()
     spans = trace.get("spans") or (trace.get("data") or {}).get("spans") or ()
     # what is of the outermost span is of the trace, to which people give theirs
-    within = [span["span_id"] for span in spans if span.get("parent_span_id")]
-    inner = {b64decode(span_id).hex() for span_id in within}
+    inner = {b64decode(of["span_id"]).hex() for of in spans if of.get("parent_span_id")}
     correction = {of["overrides"]: of for of in assessments if of.get("overrides")}
     for each in assessments:
         source, span = each["source"], each.get("span_id")
