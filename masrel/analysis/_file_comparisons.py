@@ -232,8 +232,12 @@ def _equality_rows(
         {**row, "title": questions.title(entry), "test": test}
         for row, (entry, test, _) in zip(rows, results, strict=True)
     ]
-    notes = dict.fromkeys(note(test) for _, test, _ in results)
-    return Answer(name="equality", rows=rows, shown=shown, notes=tuple(notes))
+    return Answer(
+        name="equality",
+        rows=rows,
+        shown=shown,
+        notes=tuple(dict.fromkeys(note(test) for _, test, _ in results)),
+    )
 
 
 def _equality_tests(
@@ -245,8 +249,8 @@ def _equality_tests(
     weights, clusters = questions.weights_of(entry), groups.clusters
     sets = [on_grades(ratings, entry, file) for ratings in groups.sets]
     if groups.is_dependent:
-        result = differences(entry, sets, weights=weights, clusters=clusters)
-        yield "Hotelling's T² as F", result.equality
+        of_all = differences(entry, sets, weights=weights, clusters=clusters)
+        yield "Hotelling's T² as F", of_all.equality
         return
     if clusters is None:
         estimates = [entry(ratings, weights=weights) for ratings in sets]

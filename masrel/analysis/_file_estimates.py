@@ -146,8 +146,11 @@ class Questions(Estimating):
     def record(self) -> dict[str, object]:
         """Return every option that decides a number."""
         if self.judging is not None:
-            of_interval = {"target": self.target, "level": self.level}
-            return {**self.judging.record(), **of_interval}
+            return {
+                **self.judging.record(),
+                "target": self.target,
+                "level": self.level,
+            }
         options = {"metric": self.metric, "convention": self.convention}
         return {
             "coefficients": self.names,
@@ -208,8 +211,11 @@ class Questions(Estimating):
             ),
         )
         of_items = clusters is not None or self.convention is not None
-        target = "items" if of_items else self.target
-        return replace(self, weights=plain_name(self.weights), target=target)
+        return replace(
+            self,
+            weights=plain_name(self.weights),
+            target="items" if of_items else self.target,
+        )
 
     def on_scale(self, file: "RatingsFile") -> "Questions":
         """Return the same with weights that are in a file, or a matrix."""

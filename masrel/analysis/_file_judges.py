@@ -119,8 +119,9 @@ def _parts(
         np.array([*of, None], object) for of in (scale.grades, scale.values)
     )
     for part, group, keys in parts_of(file):
-        kinds = file.read.get("kinds", {})
-        judges, humans = _roles(judging, questions.reference, part.raters, kinds)
+        judges, humans = _roles(
+            judging, questions.reference, part.raters, file.read.get("kinds", {})
+        )
         with placed(file.read["file"], group):
             codes = code_ratings(part.ratings).codes.T  # (n_raters, n_items)
         items = part.items or tuple(map(str, range(1, codes.shape[1] + 1)))

@@ -70,8 +70,12 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
 def _shown(row: Row) -> Row:
     reason = row.get("reason")
     why = [] if reason is None else [f"undefined: {reason}"]
-    texts = [*why, *row["notes"]]
-    return {**row, "title": row["judge"], "group": "", "texts": texts}
+    return {
+        **row,
+        "title": row["judge"],
+        "group": "",
+        "texts": [*why, *row["notes"]],
+    }
 
 
 def _verdicts(file: RatingsFile) -> tuple[dict[str, list[_Verdict]], str]:

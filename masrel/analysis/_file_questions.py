@@ -80,13 +80,16 @@ def answers(
     """Return the ratings without a reference, and the answers, agreement first."""
     # more: questions of one command alone
     sessions = list(dict.fromkeys(str(part.session) for part in file.parts))
-    if len(sessions) > 1 and not questions.retest:
-        retest = ", --retest compares them" * (questions.command == "agree")
-        raise RatingsError(
+    retest = ", --retest compares them" * (questions.command == "agree")
+    refuse(
+        (
+            len(sessions) > 1 and not questions.retest,
             f"{file.read['file']}: holds {len(sessions)} sessions "
             f"({', '.join(sessions)}), so that raters graded the same item more than "
-            f"once; --by {file.read['session']} estimates each{retest}"
-        )
+            f"once; --by {file.read['session']} estimates each{retest}",
+        ),
+        error=RatingsError,
+    )
     if questions.weights != "identity" and not isinstance(questions.weights, Weights):
         check_order(file, f"--weights {questions.weights}")
     reference = questions.reference
@@ -362,8 +365,10 @@ def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
 def _indices(file: RatingsFile, _: Questions) -> Iterator[Answer]:
     """Give what the margins of two raters and two categories do to kappa."""
     rows_of = partial(_of_margins, file.scale.grades)
-    notes = tuple(map(note, ("pabak", "on_category", "largest")))
-    yield replace(_table("indices", file, rows_of, "--indices"), notes=notes)
+    yield replace(
+        _table("indices", file, rows_of, "--indices"),
+        notes=tuple(map(note, ("pabak", "on_category", "largest"))),
+    )
 
 
 _OF_TABLE = {
@@ -606,8 +611,11 @@ def _diagnosis_notes(
     right = [] if reference is None else [note("reference", rater=reference)]
     texts = dict.fromkeys(f"{text}." for result in results for text in result.notes)
     of_raters = [*right, *(ends["raters"] or [note("no_ends")]), *texts]
-    confusion = [note("confusion"), *ends["confusion"]]
-    return {**ends, "raters": of_raters, "confusion": confusion}
+    return {
+        **ends,
+        "raters": of_raters,
+        "confusion": [note("confusion"), *ends["confusion"]],
+    }
 
 
 # Options and commands to what answers them, in the order in which it is shown

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
-from masrel._input import listed
+from masrel._input import listed, refuse
 from masrel.errors import ParameterError
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
@@ -126,18 +126,20 @@ def read_gate(
     estimate, _, number = name.strip().rpartition(".")
     every = dict.fromkeys(of for several in numbers.values() for of in several)
     fitting = numbers.get(estimate, every or (number,))
-    if number not in fitting:
-        raise ParameterError(
+    is_number = _NUMBER.fullmatch(limit) and math.isfinite(float(limit))
+    refuse(
+        (
+            number not in fitting,
             f"{where}: needed one of {listed(fitting)} after the name of "
-            f"{what} and a dot, got {name!r}"
-        )
-    if estimate not in numbers:
-        raise ParameterError(
+            f"{what} and a dot, got {name!r}",
+        ),
+        (
+            estimate not in numbers,
             f"{where}: needed {what} ({listed(numbers) or 'there is none'}), got "
-            f"{estimate!r}"
-        )
-    if not _NUMBER.fullmatch(limit) or not math.isfinite(float(limit)):
-        raise ParameterError(f"{where}: needed a number as limit, got {limit!r}")
+            f"{estimate!r}",
+        ),
+        (not is_number, f"{where}: needed a number as limit, got {limit!r}"),
+    )
     return Gate(
         estimate=estimate,
         number=number,

@@ -603,8 +603,9 @@ def advantage(
     >>> round(estimate.value, 3), round(estimate.interval.low, 3)
     (0.967, 0.872)
     """
-    of = {"judge": judge}
-    rest = _leave_out(humans, of, target, score, min_items, level, clusters)
+    rest = _leave_out(
+        humans, {"judge": judge}, target, score, min_items, level, clusters
+    )
     graded, value, interval = rest.graded, float(rest.values[0]), rest.interval
     error = low = high = math.nan
     method, reason = interval.method, None
@@ -871,8 +872,8 @@ def _without_humans(graded: _Graded, target: Target) -> Floats:
     rest = []
     for j in tested:  # whom nobody is held against then
         rated = graded.rated & (np.arange(len(graded.names)) != j)
-        both = rated & (rated.sum(axis=1, keepdims=True) >= 2)
-        rest.append(replace(graded, rated=both))
+        rated &= rated.sum(axis=1, keepdims=True) >= 2
+        rest.append(replace(graded, rated=rated))
     return np.stack([_advantages(of.nearer() == 1, of) for of in rest], axis=1)
 
 

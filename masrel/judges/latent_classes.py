@@ -322,9 +322,8 @@ def _other_starts(
         chosen = np.sort(rng.choice(chosen, n_patterns, replace=False))
         part = replace(votes, counts=votes.counts[chosen], freq=votes.freq[chosen])
     around = np.repeat(part.votes()[:, None] + 0.1, _N_STARTS, axis=1)
-    drawn = _dirichlet(around, -1, rng)
-    first = fits.posterior[chosen]
-    tried = _climb(part, np.concatenate([first, drawn], axis=1), max_steps, settled)
+    starts = [fits.posterior[chosen], _dirichlet(around, -1, rng)]
+    tried = _climb(part, np.concatenate(starts, axis=1), max_steps, settled)
     gains = tried.log_likelihood - tried.log_likelihood[0]
     best, n_higher = int(gains.argmax()), int((gains > _HIGHER).sum())
     if not n_higher:

@@ -341,8 +341,10 @@ def _infinite(wins: Floats, models: list[object]) -> str | None:
         inside = group == number
         if not wins[~inside][:, inside].any():
             names = listed(repr(models[i]) for i in np.flatnonzero(inside))
-            reason = f"{names}: no loss to any other model, so no finite strength"
-            return undefined("the Bradley-Terry model", reason)
+            return undefined(
+                "the Bradley-Terry model",
+                f"{names}: no loss to any other model, so no finite strength",
+            )
     return None
 
 

@@ -188,15 +188,23 @@ def corrected_rate(
     check_share("rate", rate)
     check_count("n", n)
     for name, pair in (("sensitivity", sensitivity), ("specificity", specificity)):
-        is_pair = isinstance(pair, tuple | list) and len(pair) == 2
-        needed = "needs a share and the number of items that it is of"
-        refuse((not is_pair, f"{name}: {needed}, got {shown(pair)}"))
+        refuse(
+            (
+                not isinstance(pair, tuple | list) or len(pair) != 2,
+                f"{name}: needs a share and the number of items that it is of, got "
+                f"{shown(pair)}",
+            )
+        )
         check_share(name, pair[0])
         check_count(name, pair[1])
     total = sensitivity[0] + specificity[0]
-    needed = "sensitivity, specificity: need a sum above 1"
-    why = "such a judge tells nothing of the rate"
-    refuse((total <= 1.0, f"{needed}, got {total:.4g}: {why}"))
+    refuse(
+        (
+            total <= 1.0,
+            f"sensitivity, specificity: need a sum above 1, got {total:.4g}: such a "
+            "judge tells nothing of the rate",
+        )
+    )
     return _corrected(rate, n, sensitivity, specificity, level)
 
 
@@ -532,8 +540,13 @@ def labels_needed(
     expected = _share_moments(n, n_items - n, rate, passed, rate * sensitivity, passed)
     low, high = expected.padded_ends(None, level)
     widths = (np.clip(high, 0.0, 1.0) - np.clip(low, 0.0, 1.0)) / 2.0
-    needed = f"{widths[-1]:.4g} or more, which labels of all {n_items} items give"
-    refuse((widths[-1] > half_width, f"half_width: needs {needed}, got {half_width}"))
+    refuse(
+        (
+            widths[-1] > half_width,
+            f"half_width: needs {widths[-1]:.4g} or more, which labels of all "
+            f"{n_items} items give, got {half_width}",
+        )
+    )
     # one more than the last number that is too few: cutting may narrow a wide interval
     too_few = n[widths > half_width]
     return int(too_few[-1]) + 1 if too_few.size else 2

@@ -76,8 +76,12 @@ def precision(study: Study, *, progress: Progress | None = None) -> Plan:
     >>> round(plan.expected_half_width, 4), round(plan.assurance, 3)
     (0.0995, 0.513)
     """
-    needed = "n_items, n_raters: a study that is shown needs both"
-    refuse((None in (study.n_items, study.n_raters), needed))
+    refuse(
+        (
+            None in (study.n_items, study.n_raters),
+            "n_items, n_raters: a study that is shown needs both",
+        )
+    )
     check_aim(study, is_solved=False)
     design = design_of(study)
     check_has_numbers(design)
@@ -473,8 +477,12 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     most = int(min(design.max_raters, _MAX_RATERS))
     smallest = _Search(design.of_size(n_raters=design.min_raters), progress)
     least = smallest.cost(smallest.lowest)
-    needed = f"needs at least {least:g}, of the smallest study"
-    refuse((limit < least, f"max_cost: {needed}; got {limit:g}"))
+    refuse(
+        (
+            limit < least,
+            f"max_cost: needs at least {least:g}, of the smallest study; got {limit:g}",
+        )
+    )
     best = smallest.at(smallest.lowest)
     if math.isinf(limit):
         best = _first_that_reaches(design, most, progress)

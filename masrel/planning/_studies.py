@@ -83,8 +83,9 @@ def _drawn(design: Design, progress: Progress | None) -> Shown:
     size = min(size, n_studies or size)
     total, task, n_tasks = np.zeros((3, len(NUMBERS))), 0, 1
     while task < n_tasks:  # each has its own seed
-        rng = np.random.default_rng([design.study.seed, task])
-        total += simulated(design, rng, size)
+        total += simulated(
+            design, np.random.default_rng([design.study.seed, task]), size
+        )
         task += 1
         numbers, errors = numbers_of(total)
         half = numbers.get("expected_half_width", 0.0) or math.inf
@@ -234,19 +235,17 @@ def _events(design: Design, outcomes: Floats) -> Floats:
     if study.lower is not None or study.upper is not None:
         lower, upper = limits_of(study)
         is_power = study.power is not None and study.null is None
-        name = "power" if is_power else "assurance"
-        events[name] = (low >= lower) & (high <= upper)
+        is_inside = (low >= lower) & (high <= upper)
+        events["power" if is_power else "assurance"] = is_inside
     if study.half_width is not None:
         events["assurance"] = half <= study.half_width * (1.0 + _LEAST)
+    is_lower = study.lower is not None or study.upper is None
     if study.null is not None:  # the end on the side of the null lies beyond it
-        is_above = design.value >= study.null
-        events["power"] = low > study.null if is_above else high < study.null
+        is_lower = design.value >= study.null
+        events["power"] = low > study.null if is_lower else high < study.null
     from_below, from_above = low <= design.value + _TINY, high >= design.value - _TINY
     events["coverage"] = from_below & from_above
     if study.sides == 1:  # one end is the bound: that on the side of what is asked
-        is_lower = study.lower is not None or study.upper is None
-        if study.null is not None:
-            is_lower = design.value >= study.null
         events["coverage"] = from_below if is_lower else from_above
     return np.column_stack(list(events.values()))
 

@@ -100,8 +100,11 @@ def read_table(data: Any, options: Reading) -> tuple[Sheet, Reading]:
     cells = [column_of(_TABLE, str(k), frame.iloc[:1, k]) for k in frame.columns]
     first = ["".join(column.texts) for column in cells]
     are_named = options.item or options.rater or options.grade
-    no_item = options.no_item or (is_array and not are_named)
-    options = replace(options, no_header=True, no_item=no_item)
+    options = replace(
+        options,
+        no_header=True,
+        no_item=options.no_item or (is_array and not are_named),
+    )
     return sheet_of(_TABLE, str, frame[1:].set_axis(first, axis=1), facts), options
 
 
@@ -607,8 +610,9 @@ def _export(
         raise refusal(name, "no rating", field=of)
     used = _by_kind(used)
     names = ["item", "rater", chosen or "grade", "text", "cluster"]
-    rows = [_row(name, who, of) for who in used]
-    frame = pd.DataFrame(rows, columns=names, dtype=object)
+    frame = pd.DataFrame(
+        [_row(name, who, of) for who in used], columns=names, dtype=object
+    )
     is_there = [
         k < 3 or (is_so and names[k] != chosen)
         for k, is_so in enumerate(frame.notna().any())

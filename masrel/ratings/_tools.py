@@ -111,8 +111,12 @@ def _inception(_: str, row: _Record) -> Iterator[Annotation]:
     if other := row.keys() - {"doc", "user", "label"}:
         raise KeyError(f"columns of spans or chains, {', '.join(map(str, other))}")
     is_other = row["user"] in ("CURATION_USER", "INITIAL_CAS")
-    why = "of the curator or the source" if is_other else ""
-    yield Annotation(row["doc"], row["user"], {"label": row["label"]}, why=why)
+    yield Annotation(
+        row["doc"],
+        row["user"],
+        {"label": row["label"]},
+        why="of the curator or the source" if is_other else "",
+    )
 
 
 # ---- tools that evaluate models ----
