@@ -233,9 +233,8 @@ class Questions(Estimating):
 
     def between_raters(self, file: "RatingsFile") -> "Questions | None":
         """Return what is estimated between raters; None where that is nothing."""
-        if self.judging is not None:
-            return None
-        if self.retest and all(len(part.raters) == 1 for part in file.parts):
+        are_alone = self.retest and all(len(part.raters) == 1 for part in file.parts)
+        if self.judging is not None or are_alone:
             return None
         if not self.retest or self.coefficients is None:
             return self

@@ -396,9 +396,11 @@ class _Graded:
             return np.arange(len(self.items))
         of = _by_item(clusters, "clusters")
         codes, _ = label_codes([list(map(of.get, self.items))], None)
-        if (codes < 0).any():
-            item = self.items[int(codes[0].argmin())]
-            raise RatingsError(f"clusters: item {item!r} needs one, got nothing")
+        item = self.items[int(codes[0].argmin())]
+        refuse(
+            ((codes < 0).any(), f"clusters: item {item!r} needs one, got nothing"),
+            error=RatingsError,
+        )
         return np.asarray(codes[0], dtype=np.int64)
 
 

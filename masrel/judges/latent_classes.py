@@ -490,13 +490,11 @@ def dawid_skene_intervals(
     fit = _result(votes, fits, start="majority")
     drawn = _draw(votes, fits, -(-n_resamples // _N_CHAINS), generator)
     n_draws, n_switched = len(drawn[0]), _count_switches(fit.confusion, drawn[1])
-    blank = 0.0
-    cautions: tuple[str, ...] = ()
-    if fit.reason is None:
-        cautions = _cautions(fit, n_switched, n_draws)
-    else:
+    is_known = fit.reason is None
+    if fit.reason is not None:
         undefined("an interval of the Dawid-Skene model", fit.reason)
-        blank = math.nan
+    cautions = _cautions(fit, n_switched, n_draws) if is_known else ()
+    blank = 0.0 if is_known else math.nan
     shares, confusion = (
         _ends(estimate + blank, of, level)
         for estimate, of in zip((fit.shares, fit.confusion), drawn, strict=True)

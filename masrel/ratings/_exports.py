@@ -129,8 +129,10 @@ def _named(data: Any) -> pd.DataFrame:
         return table_frame(_arrow(data))
     if frame.index.names == [None] and frame.index.dtype.kind in "iu":
         return frame.reset_index(drop=True)
-    names = ["" if name is None else str(name) for name in frame.index.names]
-    return frame.reset_index(names=names, allow_duplicates=True)
+    return frame.reset_index(
+        names=["" if name is None else str(name) for name in frame.index.names],
+        allow_duplicates=True,
+    )
 
 
 def _arrow(data: Any) -> Any:
@@ -277,9 +279,11 @@ def _workbook(
     # -> the rows of a sheet, and how many blank ones are above
     calamine = library(name, "python_calamine")
     if data.startswith(_ZIP):  # not an .xls
-        do = "save its sheet as CSV, since a large table of text is read piece by piece"
-        sheets = r"xl/worksheets/.*\.xml"  # not of .ods
-        files = unzipped(name, suffix, data, _MAX_WORKBOOK, do, sheets)
+        files = unzipped(
+            *(name, suffix, data, _MAX_WORKBOOK),
+            "save its sheet as CSV, since a large table of text is read piece by piece",
+            r"xl/worksheets/.*\.xml",  # not of .ods
+        )
         # errors of formulas, such as #N/A, which calamine gives as empty cells
         errors = Counter(
             e for xml in files.values() for e in _ERROR_CELL.findall(xml())
@@ -355,8 +359,9 @@ def table_frame(table: Any) -> pd.DataFrame:
     frame: pd.DataFrame = table.to_pandas(integer_object_nulls=True)
     if isinstance(frame.index, pd.RangeIndex) and frame.index.name is None:
         return frame
-    names = [str(name or "") for name in frame.index.names]
-    return frame.reset_index(names=names, allow_duplicates=True)
+    return frame.reset_index(
+        names=[str(name or "") for name in frame.index.names], allow_duplicates=True
+    )
 
 
 def _statistical(

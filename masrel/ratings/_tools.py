@@ -47,8 +47,10 @@ def _label_studio(_: str, task: _Record) -> Iterator[Annotation]:
                 of = grades.setdefault(str(result.get("from_name")), [])
                 of += _labels(value)
         is_skipped = annotation.get("was_cancelled") or annotation.get("skipped")
-        why = "skipped" if is_skipped else ""
-        yield Annotation(task.get("id"), who, grades, data.get("text", only), why)
+        yield Annotation(
+            *(task.get("id"), who, grades, data.get("text", only)),
+            why="skipped" if is_skipped else "",
+        )
 
 
 # The keys of Label Studio's results that are categories, and what its JSON-MIN has
@@ -79,8 +81,9 @@ def _doccano(path: str, example: _Record) -> Iterator[Annotation]:
     text = example.get("text", example.get("filename"))
     keys = {"label", "labels", "cats"} & example.keys()
     if keys:
-        grades = {key: example[key] for key in sorted(keys)}
-        yield Annotation(example.get("id"), rater, grades, text)
+        yield Annotation(
+            example.get("id"), rater, {key: example[key] for key in sorted(keys)}, text
+        )
     for label in example.get("annotations") or ():  # old: labels, users by number
         grade = label if "start_offset" in label else label.get("label")
         yield Annotation(
