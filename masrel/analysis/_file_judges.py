@@ -478,10 +478,11 @@ def _effective_number(part: _Part, raters: Sequence[str]) -> _Made:
     if not any(gold.values()):
         return
     graded = zip(*(part.texts[rater].values() for rater in raters), strict=True)
-    both = zip(gold.values(), graded, strict=True)
     # items that all have graded, and whose right grade is known
     wrong = [
-        [of != right for of in row] for right, row in both if None not in (right, *row)
+        [of != right for of in row]
+        for right, row in zip(gold.values(), graded, strict=True)
+        if None not in (right, *row)
     ]
     refuse(
         (

@@ -480,9 +480,13 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
 
     if questions.coefficients is None and questions.metric is None:
         questions = replace(questions, coefficients=["fleiss_kappa"])
-    is_several = questions.takes_all or len(questions.names) > 1
     names = ",".join(questions.names)
-    refuse((is_several, f"--coefficients: needs one coefficient, got {names}"))
+    refuse(
+        (
+            questions.takes_all or len(questions.names) > 1,
+            f"--coefficients: needs one coefficient, got {names}",
+        )
+    )
     (entry,) = entries(questions, file, file.parts)
     title, grades = questions.title(entry), file.scale.grades
     parts = []

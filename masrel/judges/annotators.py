@@ -518,9 +518,8 @@ def _values(
     exact = [Fraction(x if isinstance(x, int) else str(x)) for x in categories]
     scale = math.lcm(*(x.denominator for x in exact))
     whole = [int((x - min(exact)) * scale) for x in exact]
-    fits = max(whole) ** 2 * codes.shape[1] < 2**62
-    values = np.array(whole, dtype=np.int64 if fits else object)
-    return values[codes], lambda a, b: -((a - b) ** 2)
+    kind = np.int64 if max(whole) ** 2 * codes.shape[1] < 2**62 else object
+    return np.array(whole, dtype=kind)[codes], lambda a, b: -((a - b) ** 2)
 
 
 # -- how sure the advantage is ---------------------------------------------------------

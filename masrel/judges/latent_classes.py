@@ -241,9 +241,9 @@ def _read(ratings: object) -> _Votes:
     counts = sparse.csr_array((np.ones(len(rated)), places), shape=shape)
     counts.sum_duplicates()
     # equal items have the same places and counts
-    bounds = pairwise(counts.indptr.tolist())
     rows_of = [
-        counts.indices[a:b].tobytes() + counts.data[a:b].tobytes() for a, b in bounds
+        counts.indices[a:b].tobytes() + counts.data[a:b].tobytes()
+        for a, b in pairwise(counts.indptr.tolist())
     ]
     pattern, _ = coded(rows_of, "item")
     _, first, freq = np.unique(pattern, return_index=True, return_counts=True)
@@ -289,8 +289,7 @@ def _expected(votes: _Votes, weights: Floats) -> Floats:
 def _confusion(expected: Floats) -> Floats:
     """Return θ_jkl = Σ_i T_ik n_ijl / Σ_il T_ik n_ijl, and even chances for 0/0."""
     total = expected.sum(axis=1, keepdims=True)
-    even = 1.0 / expected.shape[1]
-    return np.where(total > 0, expected / np.where(total > 0, total, 1.0), even)
+    return divide(expected, total, 1.0 / expected.shape[1])
 
 
 def _posterior(

@@ -269,8 +269,11 @@ def numbers_of(moments: Floats) -> tuple[dict[str, float], dict[str, float]]:
 
 
 def _named(names: Sequence[str], numbers: Floats) -> dict[str, float]:
-    every = zip(names, numbers.tolist(), strict=True)
-    return {name: number for name, number in every if not math.isnan(number)}
+    return {
+        name: number
+        for name, number in zip(names, numbers.tolist(), strict=True)
+        if not math.isnan(number)
+    }
 
 
 def all_studies(n: int, p: Floats) -> Iterator[tuple[Integers, Floats]]:

@@ -389,8 +389,10 @@ def limits_of(study: Study) -> tuple[float, float]:
 
 def has_aim(study: Study) -> bool:
     """Whether a study is to show something."""
-    aims = (study.half_width, study.lower, study.upper, study.power)
-    return any(aim is not None for aim in aims)
+    return any(
+        aim is not None
+        for aim in (study.half_width, study.lower, study.upper, study.power)
+    )
 
 
 def chance_of(study: Study) -> float | None:

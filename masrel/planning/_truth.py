@@ -163,8 +163,7 @@ def rows_of(model: ItemModel, n_raters: int, *, ordered: bool) -> Integers:
     # -> (n_rows, n_raters), -1 where a rating is missing
     least, q = -int(model.p_missing > 0.0), len(model.scale)
     if ordered:
-        every = np.indices((q - least,) * n_raters).reshape(n_raters, -1)
-        return every.T + least
+        return np.indices((q - least,) * n_raters).reshape(n_raters, -1).T + least
     rows = itertools.combinations_with_replacement(range(least, q), n_raters)
     return np.array(list(rows), dtype=np.int64).reshape(-1, n_raters)
 
