@@ -1,5 +1,6 @@
 """Files and folders as tests look at them and change them."""
 
+import csv
 from pathlib import Path
 
 from masrel.lab.protocol import copy_template
@@ -9,6 +10,12 @@ def contents(folder: Path) -> dict[str, bytes]:
     """The bytes of every file of a folder, by its path in it."""
     files = (path for path in sorted(folder.rglob("*")) if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def table_of(file: Path) -> list[dict[str, str]]:
+    """The rows of a table, without lines that say what it is."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if line[:1] != "#"))
 
 
 def edit(file: Path, old: str, new: str, times: int = -1) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from masrel.intervals import latent_trait
 from tests.cli.process import Caller
 
 SAMPLER = "masrel.intervals.latent._sampler"
@@ -30,14 +31,8 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("masrel.intervals.latent._sampler._N_CHAINS", 16)
     monkeypatch.setattr(
         "masrel.intervals.latent._trait.latent_trait.__kwdefaults__",
-        {**_defaults(), "n_steps": 50},
+        {**(latent_trait.__kwdefaults__ or {}), "n_steps": 50},
     )
-
-
-def _defaults() -> dict[str, object]:
-    from masrel.intervals import latent_trait
-
-    return dict(latent_trait.__kwdefaults__ or {})
 
 
 @pytest.fixture

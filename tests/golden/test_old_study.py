@@ -19,6 +19,7 @@ from typing import Any
 
 import pytest
 
+from tests.files import table_of
 from tests.golden.call import masrel
 
 OLD = Path(__file__).parent / "old_study"
@@ -37,8 +38,7 @@ what a column is said to hold."""
 
 
 def rows() -> list[dict[str, str]]:
-    with (OLD / "files.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return table_of(OLD / "files.csv")
 
 
 def sha256(file: Path) -> str:

@@ -1,6 +1,5 @@
 """masrel joint trace and tardieu: motions, models, kinds, outputs, figures."""
 
-import csv
 import json
 import re
 from math import degrees, radians
@@ -20,6 +19,7 @@ from masrel.lab.elbow import (
 )
 from masrel.lab.elbow.tone import ClaspKnife, Contracture, ToneModel
 from masrel.lab.recording import RECORDING_COLUMNS, Recording, write_recording
+from tests.files import table_of
 from tests.lab.elbow.stretches import minimum_jerk
 
 HM3 = STANDARD_MODELS["HM3"]
@@ -255,9 +255,8 @@ def test_kinds_and_models_are_scenes_beside_each_other(tmp_path: Path) -> None:
     files = ("--csv", samples, "--figure", figure, "--view", "time")
     made = scene(*names, "--speeds-deg-s", 70, 90, 2, *files)["scenes"]
     assert figure.read_bytes().startswith(b"\x89PNG")
-    with samples.open(encoding="utf-8") as file:
-        assert file.readline() == "# simulated: true\n"
-        rows = list(csv.DictReader(file))
+    assert samples.read_text(encoding="utf-8").startswith("# simulated: true\n")
+    rows = table_of(samples)
     assert list(rows[0])[:3] == ["model", "speed_deg_s", "time_s"]
     assert (
         [*dict.fromkeys((row["model"], row["speed_deg_s"]) for row in rows)]

@@ -44,10 +44,6 @@ SENSING = SimulatedOptions(torque_sensor=TorqueSensor())
 SPEED = radians(90.0)
 
 
-def moving(n_stretches: int = 1):
-    return stretching(90.0, again=(SPEED,) * (n_stretches - 1), returns=n_stretches > 1)
-
-
 @cache
 def _recording(options: BackendOptions | None, n_stretches: int) -> Recording:
     hand = stretching(90.0, again=(SPEED,) * (n_stretches - 1), returns=True)
@@ -77,7 +73,8 @@ def device_of(
     options = SENSING if measures else None
     if backend == "replay":  # a recording does not move
         options = ReplayOptions(recording=_recording(options, n_stretches))
-    hand = moving(n_stretches)
+    again = (SPEED,) * (n_stretches - 1)
+    hand = stretching(90.0, again=again, returns=n_stretches > 1)
     return open_device(backend, clock=clock, hand=hand, options=options)
 
 

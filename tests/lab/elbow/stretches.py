@@ -1,11 +1,11 @@
 """Stretches that the tests of the elbow share, and those of the paper."""
 
-import csv
 from math import radians
 from pathlib import Path
 from typing import NamedTuple
 
 from masrel.lab.elbow import ConstantSpeed, MinimumJerk
+from tests.files import table_of
 
 PUBLISHED = Path(__file__).parents[3] / "studies/hess2012/ratings/published.csv"
 
@@ -19,9 +19,10 @@ class Published(NamedTuple):
 
 def table_v() -> list[Published]:
     """The 32 models and mean speeds of Table V."""
-    with PUBLISHED.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    return [Published(row["model"], float(row["mean_speed_deg_s"])) for row in rows]
+    return [
+        Published(row["model"], float(row["mean_speed_deg_s"]))
+        for row in table_of(PUBLISHED)
+    ]
 
 
 def constant(

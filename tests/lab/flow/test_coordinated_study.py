@@ -1,6 +1,5 @@
 """The study of docs/coordinating.md, held against a script that reads its logs."""
 
-import csv
 import json
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from typing import Any
 import pytest
 
 from tests.docs.test_pages import hold_page
+from tests.files import table_of
 
 PAGE = "docs/coordinating.md"
 SCRIPT = Path(__file__).with_name("independent.py")
@@ -34,14 +34,9 @@ def logs(run: Path) -> Said:
     return dict(json.loads(done.stdout))
 
 
-def rows(file: Path) -> list[dict[str, str]]:
-    lines = file.read_text(encoding="utf-8").splitlines()
-    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
-
-
 def test_ratings_are_those_in_force_by_the_logs(run: Path, logs: Said) -> None:
     columns = ("session", "rater", "code", "model", "grade", "first_grade")
-    table = rows(run / "both/ratings/ratings.csv")
+    table = table_of(run / "both/ratings/ratings.csv")
     assert sorted(
         [*(r[c] for c in columns), r["grades_from"]] for r in table
     ) == sorted(

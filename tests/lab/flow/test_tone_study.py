@@ -1,6 +1,5 @@
 """A study that mixes kinds of models, from its template to the report."""
 
-import csv
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,7 @@ from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import PHASES, read_recording
 from masrel.lab.run import SimulatedGrades, run_session
 from masrel.lab.schedule import read_schedule
+from tests.files import table_of
 from tests.lab.flow.conftest import run
 
 RATERS = ("R1", "R2", "R3")
@@ -26,11 +26,6 @@ def rated(tmp_path_factory: pytest.TempPathFactory) -> StudyPaths:
         run("run", str(study.root), "--rater", rater, *options)
     run("ratings", str(study.root))
     return study
-
-
-def table(file: Path) -> list[dict[str, str]]:
-    lines = file.read_text(encoding="utf-8").splitlines()
-    return list(csv.DictReader(line for line in lines if line[:1] != "#"))
 
 
 def test_every_model_of_every_kind_was_presented_without_a_fault(
@@ -51,7 +46,7 @@ def test_every_model_of_every_kind_was_presented_without_a_fault(
     assert phases == [PHASES[0], ", ".join(PHASES)]
     # a contracture ends where its own range does
     assert 125.0 < float(recordings["F3"].columns["angle_deg"].max()) < 126.5
-    assert len(table(rated.ratings_file)) == 30
+    assert len(table_of(rated.ratings_file)) == 30
 
 
 @pytest.mark.slow
@@ -62,7 +57,7 @@ def test_its_report_has_traces_and_numbers_of_every_kind(rated: StudyPaths) -> N
     for name in ("other_kinds", "peak_torque"):
         file = report / "tables" / f"{name}.csv"
         assert "simulated" in file.read_text(encoding="utf-8").lower()
-        shown[name] = table(file)
+        shown[name] = table_of(file)
     kinds = {m.id: m.kind for m in read_protocol(rated.protocol).models}
     others = {row["model"]: row["kind"] for row in shown["other_kinds"]}
     assert others == {m: kind for m, kind in kinds.items() if kind != "spastic-elbow"}

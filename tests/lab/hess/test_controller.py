@@ -1,9 +1,7 @@
 """The controller of Fig. 7: phases, the law sample by sample, friction, lost grip."""
 
-import csv
 import math
 from math import radians
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +16,7 @@ from masrel.lab.hess import (
     FrictionCompensation,
 )
 from masrel.lab.recording import PHASES
+from tests.lab.elbow.stretches import table_v
 
 from .rig import (
     CATCH,
@@ -31,15 +30,6 @@ from .rig import (
     present,
     scripted,
 )
-
-STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
-
-
-def table_5() -> list[tuple[str, float]]:
-    # Every model with every mean speed at which a rater stretched it
-    with (STUDY / "ratings" / "published.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    return [(row["model"], float(row["mean_speed_deg_s"])) for row in rows]
 
 
 def stretched(
@@ -57,13 +47,8 @@ def stretched(
 # The law
 
 
-def test_table_5_is_whole() -> None:
-    assert len(table_5()) == 32
-    assert {model for model, _ in table_5()} == set(MODELS)
-
-
 @pytest.mark.parametrize("is_even", [True, False])
-@pytest.mark.parametrize(("model", "speed_deg_s"), table_5())
+@pytest.mark.parametrize(("model", "speed_deg_s"), table_v())
 def test_it_asks_for_the_torque_of_the_trace_bit_for_bit(
     model: str, speed_deg_s: float, is_even: bool
 ) -> None:
@@ -85,9 +70,6 @@ def test_it_asks_for_the_torque_of_the_trace_bit_for_bit(
     assert torque.tobytes() == made.torque.tobytes()
     np.testing.assert_array_equal(phase, made.phase)
     assert not stepped.grip_lost
-
-
-# Phases
 
 
 # The estimated speed
@@ -285,7 +267,7 @@ def test_after_a_slip_the_torque_is_that_of_pre_catch_and_the_arm_slow_enough(
     # Section III.B.3: the slowest and the fastest stretch of Table V of this model.
     # 11.3 N·m on 0.06 kg·m² take 40 deg/s in 3.7 ms; the estimate follows 5.6 ms later.
     options = {"limits": DeviceLimits(torque=28.0), "max_duration_s": 3.0}
-    speeds = [speed for name, speed in table_5() if name == model]
+    speeds = [speed for name, speed in table_v() if name == model]
     for speed in (min(speeds), max(speeds)):
         held = present(model, speed, **options).recording
         assert held.facts["grip_lost"] is False

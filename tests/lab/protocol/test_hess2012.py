@@ -1,11 +1,11 @@
 """The bundled published study says what the paper's tables say."""
 
-import csv
 from pathlib import Path
 
 import pytest
 
 from masrel.lab.protocol import Protocol, read_protocol
+from tests.files import table_of
 
 STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
 
@@ -29,8 +29,7 @@ def protocol() -> Protocol:
 
 
 def rows(name: str) -> list[dict[str, str]]:
-    with (STUDY / "ratings" / name).open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return table_of(STUDY / "ratings" / name)
 
 
 def test_the_published_ratings_are_table_v_cell_by_cell() -> None:

@@ -1,6 +1,5 @@
 """Reports made for tests, and their pages taken apart."""
 
-import csv
 import re
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
@@ -14,6 +13,7 @@ from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.lab.report import ReportFiles, write_report
 from masrel.scales import MODIFIED_ASHWORTH
+from tests.files import table_of
 from tests.lab.analysis.studies import in_person, plan, protocol_with, table_v
 
 ALL = (
@@ -116,8 +116,7 @@ def page(files: ReportFiles) -> str:
 
 def rows_of(files: ReportFiles, name: str) -> list[dict[str, str]]:
     (path,) = [path for path in files.tables if path.stem == name]
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return table_of(path)
 
 
 @dataclass

@@ -1,6 +1,5 @@
 """Estimates as a report tells them: the first paragraph, a table, their meaning."""
 
-import csv
 import dataclasses
 import math
 import re
@@ -15,6 +14,7 @@ from masrel.lab.analysis import PlannedEstimate, analyze
 from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.lab.report import ReportFiles, write_report
 from masrel.scales import MODIFIED_ASHWORTH
+from tests.files import table_of
 from tests.lab.analysis.studies import of_session, plan, protocol_with, ratings, table_v
 from tests.lab.report.pages import AGAIN, rows_of, simulated_ratings, written
 
@@ -122,8 +122,7 @@ def shown(
     text = files.markdown.read_text(encoding="utf-8").replace("\\", "")
     lines = [line for line in text.splitlines() if line.startswith("| ")]
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
-    with files.tables[0].open(encoding="utf-8", newline="") as file:
-        return cells, list(csv.DictReader(file)), text
+    return cells, table_of(files.tables[0]), text
 
 
 def test_intervals_made_alike_share_a_meaning_and_wide_ones_are_not_shown(

@@ -294,10 +294,6 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> StudyPaths:
     return study
 
 
-def copied(study: StudyPaths, root: Path) -> StudyPaths:
-    return StudyPaths(shutil.copytree(study.root, root))
-
-
 def events_of(study: StudyPaths) -> dict[str, Events]:
     """Every log of a study, without times."""
     return {
@@ -501,7 +497,10 @@ def test_an_act_leaves_the_events_of_its_verb_or_is_refused_in_the_same_sentence
         name: read_schedule(drawn.schedule_file(rater, "test")).presentations[0].code
         for name, rater in (("GRADED", "R1"), ("FAULTED", "R2"))
     }
-    at_page, at_verb = (copied(drawn, tmp_path / name) for name in ("page", "verb"))
+    at_page, at_verb = (
+        StudyPaths(shutil.copytree(drawn.root, tmp_path / name))
+        for name in ("page", "verb")
+    )
     fields = {name: first.get(value, value) for name, value in fields.items()}
     of_page = by_the_page(at_page, act, fields)
     of_verb = by_the_verb(at_verb, verb, *(first.get(word, word) for word in words))

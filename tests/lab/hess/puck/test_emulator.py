@@ -58,10 +58,6 @@ def position(one: Bench) -> int:
     return one.node.position(P, patience_s=0.001)[1]
 
 
-def angle_deg(one: Bench) -> float:
-    return degrees(one.emulator.motor.angle(one.clock.now_ns()))
-
-
 # Asleep and awake
 
 
@@ -101,7 +97,7 @@ def test_it_holds_its_last_torque_for_ever_but_not_idle(on) -> None:
     told(one, (MODE, 2), (T, 144), wait_s=60.0)  # nobody says anything for a minute
     torque = one.emulator.motor.plant.motor_torque
     assert torque == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
-    assert angle_deg(one) > 145.9
+    assert degrees(one.emulator.motor.angle(one.clock.now_ns())) > 145.9
 
 
 def test_the_babbling_of_others_is_bounded(on) -> None:

@@ -54,10 +54,6 @@ def distinct_orders(letters: Sequence[object]) -> set[tuple[object, ...]]:
     }
 
 
-def longest_run(order: Sequence[object]) -> int:
-    return max(len(list(run)) for _, run in itertools.groupby(order))
-
-
 @pytest.mark.parametrize(("sizes", "n_free", "longest"), LIMITED)
 def test_numbers_are_one_to_one_with_words_of_limited_runs(
     sizes: tuple[int, ...], n_free: int, longest: int
@@ -112,7 +108,7 @@ def keeps(order: Sequence[str], protocol: Protocol) -> bool:
     """Whether an order keeps the limits of its scheme, from their words."""
     rules = protocol.schedule
     if rules.scheme == "no-immediate-repeat":
-        return longest_run(order) == 1
+        return all(one != then for one, then in itertools.pairwise(order))
     models = {model.id: model for model in protocol.models}
     roles = [models[name].role for name in order]
     if rules.standards_apart and ("standard", "standard") in itertools.pairwise(roles):
