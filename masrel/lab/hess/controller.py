@@ -348,7 +348,7 @@ class Controller:
                 self.is_easing = False
                 self.phase = _PRE_CATCH  # no end that takes its time
             past.append(restored)
-        self.model_torque = torque = self._asked(time_s, angle, velocity)
+        self.model_torque = torque = self._wanted_torque(time_s, angle, velocity)
         command = torque - self._compensation.torque(velocity)
         phase = joint.phase
         if self.phase != phase:
@@ -358,7 +358,7 @@ class Controller:
         self._command = command
         return command
 
-    def _asked(self, time_s: float, angle: float, velocity: float) -> float:
+    def _wanted_torque(self, time_s: float, angle: float, velocity: float) -> float:
         # What the model asks for, with one catch within one push
         joint = self._joint
         torque = joint.step(time_s, angle, velocity)

@@ -6,9 +6,11 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from types import TracebackType
-from typing import ClassVar, Literal, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
+from masrel._input import listed
 from masrel.errors import DeviceError
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess.hand import Hand
@@ -281,12 +283,14 @@ class DeviceSetup:
 
 
 # Name to the module whose `build` makes a device of a `DeviceSetup`, not yet open, or
-# raises `DeviceError` when it does not fit; imported when it is chosen
+# raises `DeviceError` when it does not fit; imported when it is chosen. Those of other
+# distributions are entry points of the group; none takes a name of these.
 _BACKENDS = {
     "puck": "masrel.lab.hess.puck._puck_device",
     "replay": "masrel.lab.hess._replay",
     "simulated": "masrel.lab.hess._simulated",
 }
+_GROUP = "masrel.devices"
 
 
 def device_names() -> tuple[str, ...]:
@@ -295,14 +299,37 @@ def device_names() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names in alphabetical order.
+        Names in alphabetical order: masrel's own, and those that other distributions
+        declare as entry points of the group ``masrel.devices``.
 
     Examples
     --------
     >>> "simulated" in device_names()
     True
     """
-    return tuple(sorted(_BACKENDS))
+    return tuple(sorted({*_BACKENDS, *entry_points(group=_GROUP).names}))
+
+
+def _backend(name: str) -> Any:
+    """Return the module of a device, or refuse a name that is nobody's or several's."""
+    if name in _BACKENDS:
+        return importlib.import_module(_BACKENDS[name])
+    declared = list(entry_points(group=_GROUP, name=name))
+    if not declared:
+        raise DeviceError(
+            f"device: needs one of {', '.join(device_names())}, got {name!r}"
+        )
+    of = sorted(
+        f"{of.dist.name} ({of.value})" if of.dist else of.value for of in declared
+    )
+    if len(declared) > 1:
+        raise DeviceError(f"device {name!r}: needs one distribution, got {listed(of)}")
+    try:
+        return declared[0].load()
+    except Exception as error:  # whatever another's module does
+        raise DeviceError(
+            f"device {name!r} of {of[0]}: {type(error).__name__}: {error}"
+        ) from error
 
 
 def open_device(
@@ -336,8 +363,9 @@ def open_device(
     Raises
     ------
     DeviceError
-        If there is no device of that name, a simulated one has no hand, the
-        options are another backend's, or it cannot be opened.
+        If there is no device of that name or there are several, its module cannot be
+        imported, a simulated one has no hand, the options are another backend's, or it
+        cannot be opened.
     ParameterError
         If `range_end` does not fit the hand.
 
@@ -349,12 +377,7 @@ def open_device(
     ...     round(device.read().angle, 3)
     0.5
     """
-    module = _BACKENDS.get(name)
-    if module is None:
-        raise DeviceError(
-            f"device: needs one of {', '.join(device_names())}, got {name!r}"
-        )
-    device: Device = importlib.import_module(module).build(
+    device: Device = _backend(name).build(
         DeviceSetup(clock=clock, hand=hand, range_end=range_end, options=options)
     )
     device.open()

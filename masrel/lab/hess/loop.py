@@ -282,7 +282,7 @@ class _Ticks:
         self._is_ending = False
         # what is asked for before anything moves, N·m, and the share of it to come
         self._first = 0.0
-        self._missing = iter((1.0, *raised_cosine(_FADE_IN_S, controller.rate_hz)))
+        self._fade_in = iter((1.0, *raised_cosine(_FADE_IN_S, controller.rate_hz)))
 
     def run_to_the_end(self, n_ticks: int) -> tuple[str, Fault | None]:
         """Run ticks -> how they ended, and the fault; the torque is zero afterwards."""
@@ -372,7 +372,7 @@ class _Ticks:
         if not self._samples.n:
             guard.begins_with(torque)
             self._first = torque
-        torque -= next(self._missing, 0.0) * self._first
+        torque -= next(self._fade_in, 0.0) * self._first
         if self._is_ending:  # whatever the model asks for
             # One share a tick, however late it comes: no fall is steeper than this
             torque = self._last_torques.pop()
