@@ -240,9 +240,7 @@ def safe_cell(text: str) -> str:
     """Return a text as a cell of CSV that no spreadsheet runs as a formula."""
     # after an apostrophe; a text that begins with apostrophes and then like a formula
     # gets one more, so that what is read is what was written
-    if _FORMULA.match(text) and not _NUMBER.fullmatch(text):
-        return f"'{text}"
-    return text
+    return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
 
 
 def from_safe_cell(cell: str) -> str:

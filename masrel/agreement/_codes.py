@@ -668,8 +668,7 @@ def two_raters(
 ) -> CountedRatings:
     """Count the items that both of two raters rated."""
     counted = raters_told_apart(ratings, categories)
-    n_columns = counted.codes.shape[1]
-    if n_columns != 2:
+    if (n_columns := counted.codes.shape[1]) != 2:
         raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")
     return complete_rows(counted)
 

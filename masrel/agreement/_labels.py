@@ -98,8 +98,7 @@ def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
 
 def check_kinds(labels: Iterable[Any], where: str) -> None:
     """Check that labels are all text or all numbers."""
-    kinds = {isinstance(label, str): label for label in labels}
-    if len(kinds) > 1:
+    if len(kinds := {isinstance(label, str): label for label in labels}) > 1:
         raise RatingsError(
             f"{where}: text and numbers cannot be mixed, got {kinds[True]!r} "
             f"and {kinds[False]!r}"

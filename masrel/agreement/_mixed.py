@@ -79,8 +79,7 @@ class _Likelihood:
 
     def slopes(self, u: Floats) -> Floats:
         """Return those of the deviance at one u, by the complex step."""
-        steps = u + 1j * _TINY * np.eye(len(u))
-        return np.asarray(self.at(steps).imag / _TINY)
+        return np.asarray(self.at(u + 1j * _TINY * np.eye(len(u))).imag / _TINY)
 
     def maximum(self, precision: float) -> Floats:
         """Return the ratios (2,) of highest likelihood."""
@@ -155,8 +154,7 @@ class Components:
             return float(low), float(high)
 
         def deviance(a: Floats, x: Floats) -> Floats:
-            of_raters = self.has_raters * (x - 1.0) / n
-            ratios = np.stack([(a - 1.0) / k, of_raters], axis=-1)
+            ratios = np.stack([(a - 1.0) / k, self.has_raters * (x - 1.0) / n], axis=-1)
             return likelihood.deviance(ratios.reshape(-1, 2)).reshape(a.shape)
 
         a, x = 1.0 + self.ratios * (k, n)

@@ -481,7 +481,6 @@ def kendall_w(
     check_level(level)
     values = complete_values(ratings, categories)
     value, error, reason = _w(values, ties=ties)
-    confidence = None if reason else _w_interval(value, error, len(values), level)
     return measured(
         "kendall_w",
         values,
@@ -489,7 +488,7 @@ def kendall_w(
         value,
         weights="tie-corrected" if ties else "uncorrected",
         standard_error=error,
-        interval=confidence,
+        interval=None if reason else _w_interval(value, error, len(values), level),
         reason=reason,
     )
 
@@ -815,8 +814,7 @@ def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, float, str | 
     # 12 S / (m² (n³ - n) - m ΣT), as in Kendall (1948), in whole numbers of any size
     denominator = m**2 * (n**3 - n)
     if ties:
-        tied = sum(t**3 - t for _, freq in columns for t in freq.tolist())
-        denominator -= m * tied
+        denominator -= m * sum(t**3 - t for _, freq in columns for t in freq.tolist())
     if denominator == 0:
         why = "0/0: every rater gives all items one rating"
         return math.nan, math.nan, undefined("Kendall's W", why)

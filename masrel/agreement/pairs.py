@@ -282,14 +282,13 @@ def light_kappa(
     if deletion == "listwise":
         counted = complete_rows(counted)
     rate = np.flatnonzero((everybody.codes >= 0).any(axis=0))
-    columns = rate if len(rate) > 1 else np.arange(n_raters)
     return estimate(
         _LIGHT_PAIRWISE if deletion == "pairwise" else _LIGHT,
         counted,
         None,
         weights,
         population=population,
-        why=partial(_why_no_mean, columns),
+        why=partial(_why_no_mean, rate if len(rate) > 1 else np.arange(n_raters)),
     )
 
 

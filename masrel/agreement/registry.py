@@ -467,8 +467,7 @@ def _meant_by(name: str) -> str | None:
     import difflib  # loaded only for an error
 
     typed = name.strip().lower().replace(" ", "_").replace("-", "_").replace("'", "")
-    parts = [known for known in _BY_NAME if typed in known.split("_")]
-    if parts:
+    if parts := [known for known in _BY_NAME if typed in known.split("_")]:
         return parts[0] if len(parts) == 1 else None
     near = difflib.get_close_matches(typed, _BY_NAME, n=1, cutoff=0.75)
     return near[0] if near else None

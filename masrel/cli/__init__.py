@@ -153,8 +153,7 @@ def _in_other_letters(error: UnicodeError) -> tuple[str, int]:
     # what stdout and stderr cannot encode, on Windows' cp1252 say, they write in others
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    letters = error.object[error.start : error.end]
-    return "".join(map(_spelled, letters)), error.end
+    return "".join(map(_spelled, error.object[error.start : error.end])), error.end
 
 
 def _spelled(letter: str) -> str:

@@ -96,8 +96,7 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except click.NoSuchOption as error:
             path = "" if error.ctx is None else error.ctx.command_path
-            old = f"{' '.join(path.split()[1:2])} {error.option_name}"
-            if old in RENAMED:
+            if (old := f"{' '.join(path.split()[1:2])} {error.option_name}") in RENAMED:
                 raise _renamed(old, ctx) from error
             raise
         except ParameterError as error:
@@ -111,8 +110,7 @@ class Commands(click.Group):
             # options
             *places, rest = str(error).split(": ")
             for at, place in enumerate(places):
-                names = place.split(", ")
-                if options.keys() >= set(names):
+                if options.keys() >= set(names := place.split(", ")):
                     places[at] = ", ".join(options[name] for name in names)
             raise ParameterError(": ".join([*places, rest])) from error
 

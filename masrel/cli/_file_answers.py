@@ -268,7 +268,6 @@ def _show_answers(
     if not is_agreement and is_sentence:
         more = []  # a sentence says them all
         sentences = partial(judge_sentences, answered, output.item_name, table.data)
-    columns = shutil.get_terminal_size((_WIDTH, 24)).columns
     write_output(
         output,
         document=lambda: _record(
@@ -282,7 +281,9 @@ def _show_answers(
         stamp=SIMULATED if others.simulated else "",
         notes=(*table.read, *notes),
         more=more,
-        width=min(columns, _WIDEST) if sys.stdout and sys.stdout.isatty() else _WIDTH,
+        width=min(shutil.get_terminal_size((_WIDTH, 24)).columns, _WIDEST)
+        if sys.stdout and sys.stdout.isatty()
+        else _WIDTH,
     )
     if is_sentence:
         echo_notes((*table.read, *table.notes))

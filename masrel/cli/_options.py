@@ -54,8 +54,7 @@ class GroupedHelp(click.Command):
         """Write what belongs to no group first, and --help with it."""
         parts: dict[str, list[tuple[str, str]]] = {"Options": []}
         for param in self.get_params(ctx):
-            shown = param.get_help_record(ctx)
-            if shown is not None:
+            if (shown := param.get_help_record(ctx)) is not None:
                 heading = vars(param).get("heading", "Options")
                 parts.setdefault(heading, []).append(shown)
         for heading, records in parts.items():
@@ -220,9 +219,7 @@ def _shown(part: "Table | str", output: OutputOptions, width: int | None) -> str
         return part
     if output.csv:
         return as_csv(part, raw=output.raw_csv).rstrip("\n")
-    if output.latex:
-        return as_latex(part).rstrip("\n")
-    return as_text(part, width=width)
+    return as_latex(part).rstrip("\n") if output.latex else as_text(part, width=width)
 
 
 def write_json(

@@ -33,8 +33,7 @@ class OutputFile(click.Path):
     ) -> Any:
         """Return the path, which no input has."""
         path = super().convert(value, param, ctx)
-        file = Path(os.fsdecode(path))
-        if str(file) != "-":
+        if str(file := Path(os.fsdecode(path))) != "-":
             refuse_record(file)
             refuse_inputs(file)
         return path

@@ -53,8 +53,7 @@ def alike_interval(
     pairs = np.indices((q, q)).reshape(2, -1)
     weights = (1.0 - rho) * shares[:, pairs[0]] * shares[:, pairs[1]]
     weights[:, pairs[0] == pairs[1]] += rho * shares
-    rows = problem.features(pairs.T)
-    values = problem.values(WITHOUT_END * (weights @ rows))
+    values = problem.values(WITHOUT_END * (weights @ problem.features(pairs.T)))
     return _interval(problem, values, METHOD, prior.description, one_sided, seed)
 
 

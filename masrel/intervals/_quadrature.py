@@ -93,8 +93,7 @@ class LineDistribution:
     def density(self, at: Floats) -> Floats:
         """Return the density at some points, (n,)."""
         step = self.points[1] - self.points[0]
-        away = (at[:, None] - self.points) / step
-        density = np.sinc(away) @ self.masses / step
+        density = np.sinc((at[:, None] - self.points) / step) @ self.masses / step
         return np.asarray(density.clip(0.0))  # but for rounding
 
     def quantiles(self, shares: Sequence[float]) -> list[float]:

@@ -281,8 +281,7 @@ def pose_problem(
         and n_rows * (len(features.dense) + features.n) > _MAX_PLACES
     )
     if is_too_large and made.line is not None:
-        by_nodes = _by_nodes(formula, made.line)
-        if by_nodes is not None:
+        if (by_nodes := _by_nodes(formula, made.line)) is not None:
             formula, v, is_too_large = by_nodes, made.line, False
     return IntervalProblem(
         entry=entry,

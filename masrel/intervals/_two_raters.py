@@ -260,8 +260,7 @@ def table_interval(
     if n_single:
         notes = (f"left out, items of a single rating: {n_single}",)
     counts = problem.item_counts()
-    why = where_the_prior_weighs(counts[counts.sum(axis=1) > 1])
-    if why:
+    if why := where_the_prior_weighs(counts[counts.sum(axis=1) > 1]):
         # another prior that is as reasonable
         is_even = concentration is not None and math.isclose(concentration, 1.0 / q)
         other, other_words = table_prior(None if is_even else 1.0 / q, q)

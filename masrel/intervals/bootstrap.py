@@ -302,8 +302,7 @@ def _item_units(problem: IntervalProblem, clusters: object) -> _Units:
     if clusters is None:
         few = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
     else:
-        codes = cluster_codes(problem, clusters)
-        rows, known, n_paired = cluster_sums(problem, codes)
+        rows, known, n_paired = cluster_sums(problem, cluster_codes(problem, clusters))
         freq = known.astype(np.int64)
         few = warn_small(n_paired, 16, "clusters", int(freq.sum()))
         words = f" of {freq.sum()} clusters"

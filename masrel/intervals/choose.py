@@ -418,10 +418,9 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
         f"Dirichlet-multinomial posterior, {high:.3f}: with few items an estimate "
         "that is low by chance has a low error, too"
     )
-    halfway = 0.5 * (interval.high + high)
     return replace(
         interval,
-        high=halfway,
+        high=0.5 * (interval.high + high),
         method=f"{interval.method}, upper end lifted halfway to that of a {METHOD}",
         notes=(*interval.notes, note),
         prior=posterior.prior.description,

@@ -796,8 +796,7 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
             "estimates: needs two or more of type Estimate, got "
             f"{', '.join(type(e).__name__ for e in checked) or 'none'}"
         )
-    kinds = {(e.coefficient, e.weights): None for e in checked}
-    if len(kinds) > 1:
+    if len(kinds := {(e.coefficient, e.weights): None for e in checked}) > 1:
         of_kinds = (f"{name} ({weights})" for name, weights in kinds)
         raise ParameterError(
             f"estimates: needs one coefficient of all, got {', '.join(of_kinds)}"

@@ -156,8 +156,7 @@ def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _L
         variance, units, reason = math.nan, (), "the estimate itself is undefined"
     for unit in units:
         if unit == "items":
-            rows = problem.features(problem.codes)
-            values = problem.values(problem.sums - rows)
+            values = problem.values(problem.sums - problem.features(problem.codes))
             n = problem.n_paired_items
         elif clusters is not None:
             sums, known, n = cluster_sums(problem, clusters)

@@ -283,8 +283,7 @@ class _Posterior:
         def probability(deviation: float) -> float:
             # 3 g may go so far at every m
             max_g = np.minimum(3.0 * deviation**2 / variance, 1.0)
-            below = integrated_sinc(logit(max_g), _GRID)
-            return float((self.masses * below).sum())
+            return float((self.masses * integrated_sinc(logit(max_g), _GRID)).sum())
 
         most = math.sqrt(1.0 / 12.0)
         return [solve_quantile(probability, share, 1e-12, most) for share in shares]

@@ -123,8 +123,7 @@ def _page(
 ) -> str:
     stamp = SIMULATED if file.simulated else ""
     # what repeats it: the command or else the options, and what it was made of
-    digest = f"SHA-256 of {Path(file.read['file']).name}"
-    known = {**inputs, digest: file.sha256()}
+    known = {**inputs, f"SHA-256 of {Path(file.read['file']).name}": file.sha256()}
     return html_page(
         Document(
             title=title,

@@ -91,8 +91,7 @@ class PartSeen:
     @property
     def has_few_grades(self) -> bool:
         """Whether each grade has room in a picture, and is no measurement."""
-        n_grades = len(self.file.scale.grades)
-        return 2 <= n_grades <= _MOST_GRADES and not self.is_measured
+        return 2 <= len(self.file.scale.grades) <= _MOST_GRADES and not self.is_measured
 
     @property
     def has_intervals(self) -> bool:
@@ -134,8 +133,7 @@ class PartSeen:
     @property
     def distance(self) -> Any:
         """The weights by which ratings are apart; linear ones, if in order."""
-        metric = self.questions.metric
-        if metric is not None and self.coded is not None:
+        if (metric := self.questions.metric) is not None and self.coded is not None:
             ratings = on_grades(self.coded, self.entry, self.file)
             return _metric_weights(metric, count_ratings(ratings))
         if self.questions.weights == "identity" and self.file.is_ordered:

@@ -214,8 +214,7 @@ def html_page(document: Document) -> str:
         "svg": _svg,
     }
     style = (TEMPLATES / "page.css").read_text(encoding="utf-8")
-    template = environment.get_template("page.html")
-    return template.render(document=document, style=style)
+    return environment.get_template("page.html").render(document=document, style=style)
 
 
 def _svg(picture: bytes, alt: str) -> str:

@@ -196,8 +196,7 @@ def forest_picture(
 
 def _beside(row: ForestRow) -> tuple[float, float]:
     # inches of a label, and of its detail
-    label = _LINE + _MORE * row.label.count("\n")
-    return label, _MORE * len(row.detail.splitlines())
+    return _LINE + _MORE * row.label.count("\n"), _MORE * len(row.detail.splitlines())
 
 
 def _heights(rows: Sequence[ForestRow], ridges: Sequence[_Ridge]) -> list[float]:
@@ -364,5 +363,4 @@ def _bars(values: _Floats, shares: _Floats) -> tuple[_Floats, _Floats]:
     at = np.ceil(values / width - _SAME).astype(np.int64)
     first = at[0]
     heights = np.bincount(at - first, weights=shares).astype(np.float64)
-    edges = width * np.arange(first - 1, first + heights.size)
-    return edges, heights
+    return width * np.arange(first - 1, first + heights.size), heights

@@ -94,12 +94,17 @@ def latent_picture(scale: "LatentTrait", grades: Sequence[str]) -> Picture:
             "(0: mean of these items, or no bias)"
         )
         level = percent(scale.items[0].interval.level)
-        credible = f"{level} % credible interval"
         legend_below(
             axes,
             [
                 Line2D([], [], linestyle="none", label="posterior median", **_DOT),
-                Line2D([], [], color=BLACK, label=credible, **_INTERVAL),
+                Line2D(
+                    [],
+                    [],
+                    color=BLACK,
+                    label=f"{level} % credible interval",
+                    **_INTERVAL,
+                ),
                 Line2D([], [], label="threshold between grades", **_THRESHOLD),
                 Patch(facecolor=BLUE, alpha=0.18, label="± the rater's noise"),
             ],

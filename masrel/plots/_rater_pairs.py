@@ -141,8 +141,7 @@ def _heatmap(axes: Axes, values: _Floats, names: Sequence[str]) -> None:
 
 
 def _short(value: float) -> str:
-    text = number(value, 2).replace("0.", ".", 1)
-    return "" if math.isnan(value) else text
+    return "" if math.isnan(value) else number(value, 2).replace("0.", ".", 1)
 
 
 def _influence(

@@ -202,8 +202,7 @@ def inches_from(ax: Axes, x: float, y: float) -> Transform:
 
 def colour_bar(axes: Axes, drawn: Any, label: str, **how: Any) -> Colorbar:
     """Explain the colours of a map below it, as wide as the axes."""
-    below = inches_from(axes, 0.0, 0.0)
-    place = blended_transform_factory(axes.transAxes, below)
+    place = blended_transform_factory(axes.transAxes, inches_from(axes, 0.0, 0.0))
     bar = axes.inset_axes((0.0, -0.27, 1.0, 0.11), transform=place)
     return bar.figure.colorbar(
         drawn, cax=bar, orientation="horizontal", label=label, **how

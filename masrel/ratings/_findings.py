@@ -329,8 +329,7 @@ def listed(texts: Sequence[str], most: int = _SHOWN, more: str = "") -> str:
 
 def library(name: str, module: str, extra: str = "files") -> Any:
     """Import a library that not everybody needs, or say how to get it."""
-    top = module.partition(".")[0]
-    if find_spec(top) is None:
+    if find_spec(top := module.partition(".")[0]) is None:
         raise refusal(name, "library", library=top, extra=extra)
     return import_module(module)
 

@@ -148,8 +148,7 @@ def _grades(
         grade_of = _declared_grades(number, declared, refuse)
     elif options.set_separator:
         grade_of = _sets(list(met), options.set_separator, refuse)
-        grades = tuple(sorted(set(grade_of.values())))
-        scale = Scale(name="observed", grades=grades)
+        scale = Scale(name="observed", grades=tuple(sorted(set(grade_of.values()))))
     else:
         _refuse_plus(number, refuse)
         grade_of, scale = _observed(number, numbers.written)
@@ -209,8 +208,7 @@ def _declared_grades(
 
 def _refuse_missing(texts: Sequence[str], refuse: _Refuse) -> None:
     # what may be no grade
-    likely = [text for text in texts if normal_form(text) in _MISSING_FORMS]
-    if likely:
+    if likely := [text for text in texts if normal_form(text) in _MISSING_FORMS]:
         raise refuse("looks missing", likely, codes=quoted(likely[:MOST_CODES]))
     if broken := [text for text in texts if "\n" in text or "\r" in text]:
         raise refuse("broken", broken[:1])

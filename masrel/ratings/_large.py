@@ -165,10 +165,9 @@ def _text(path: Path, options: Reading) -> Source:
         raise NoStreamError(Finding("no stream"))
     width, first = len(sheet.columns), int(not options.no_header)
     n_above, n_before = sheet.line_of(0) - 1, sheet.line_of(first) - 1
-    lines = partial(_lines, path, n_above)
     sheet = replace(
         sheet,
-        line_of=partial(line_of, lines, delimiter, n_above),
+        line_of=partial(line_of, partial(_lines, path, n_above), delimiter, n_above),
         findings=sheet.findings + without_notes(tail, delimiter, 0)[1],
     )
     types = ", ".join(f"'{place}': 'VARCHAR'" for place in range(width))

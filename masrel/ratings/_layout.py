@@ -247,10 +247,7 @@ def _refuse_rows_of_names(sheet: Sheet, places: Sequence[int]) -> None:
     # names of a long text that are an item and a rater of the rows
     names, one = [sheet.header[place] for place in places], str(sheet.line_of(0))
     *_, rater, grade = columns = [sheet.columns[place] for place in places]
-    is_row = all(
-        name in of.texts for name, of in zip(names[:-1], columns, strict=False)
-    )
-    if is_row:
+    if all(name in of.texts for name, of in zip(names[:-1], columns, strict=False)):
         raise sheet.refuse(
             "rating as names", sheet.at(0), names=listed(names), line=one
         )

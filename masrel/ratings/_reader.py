@@ -289,10 +289,9 @@ def _grouped(
         findings = doubt_columns(source.head, layout, options, rows, grades.scale, freq)
         _large.refuse_repeated_items(answer, groups, layout)
     findings += doubt_names("raters", names)
-    ratings = _distinct(rows, freq, grades.scale)
     return _file_of(
         *(groups, layout, options, grades),
-        [RatingsPart(raters=tuple(names), ratings=ratings)],
+        [RatingsPart(raters=tuple(names), ratings=_distinct(rows, freq, grades.scale))],
         np.array(counts),
         findings + _large.doubt_names_met(answer, groups, layout),
         raters=names,
@@ -311,8 +310,7 @@ def _often(grades: Grades, freq: Codes) -> Codes:
 
 def _distinct(rows: Codes, freq: Codes, scale: Scale) -> CountedRatings:
     # rows of ratings that differ, of rows that are there so often
-    q = len(scale.grades)
-    rows = rows.astype(np.min_scalar_type(-q - 1))
+    rows = rows.astype(np.min_scalar_type(-len(scale.grades) - 1))
     rows, place = np.unique(rows, axis=0, return_inverse=True)
     return CountedRatings(
         codes=rows,
@@ -491,8 +489,7 @@ def _parts(sheet: Sheet, layout: Layout) -> tuple[Codes, list[dict[str, str]]]:
     roles = {"group": layout.by, "session": session}
     places = {role: place for role, place in roles.items() if place is not None}
     for place in places.values():
-        is_empty = sheet.columns[place].is_text("")
-        if is_empty.any():
+        if (is_empty := sheet.columns[place].is_text("")).any():
             raise sheet.refuse("no value", sheet.where(int(np.argmax(is_empty))), place)
     if not places:
         return np.zeros(len(sheet.numbers), dtype=np.int64), [{}]
@@ -578,8 +575,7 @@ def _clusters(sheet: Sheet, place: int, items: Column, row: Codes) -> tuple[str,
     of_rating = cluster.codes[row]
     of_item = np.zeros(len(items.texts), dtype=np.int64)
     of_item[items.codes] = of_rating
-    differs = np.flatnonzero(of_item[items.codes] != of_rating)
-    if len(differs):
+    if len(differs := np.flatnonzero(of_item[items.codes] != of_rating)):
         item = items.codes[differs[0]]
         two = [int(differs[0]), int(np.flatnonzero(items.codes == item)[-1])]
         raise sheet.refuse(
@@ -720,8 +716,7 @@ def _categories_of(
     sheet: Sheet, layout: Layout, names: list[str]
 ) -> tuple[list[str], list[str], tuple[str, str]]:
     # the categories of the rows and columns of a contingency table, and the raters
-    n_rows = len(sheet.numbers)
-    if n_rows != len(names):
+    if (n_rows := len(sheet.numbers)) != len(names):
         raise sheet.refuse("rows of table", n=len(names), n_rows=n_rows)
     rows = sheet.columns[layout.item[0]].cells() if layout.item else names
     sides = sides_of(rows, names)

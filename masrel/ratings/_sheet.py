@@ -546,8 +546,7 @@ def _below_comments(name: str, text: str, start: int, delimiter: str | None) -> 
         is_meant = mark != " " or not two_lines[0].startswith("# ")
         if is_meant and 1 < n_cells == n_below:
             if re.match(r"#\s+[^\s,;|]", two_lines[0]) and mark != "\t":
-                line_number = _n_lines(text, last) + 1
-                raise refusal(name, "comment or header", line=line_number)
+                raise refusal(name, "comment or header", line=_n_lines(text, last) + 1)
             return last
     return end
 
@@ -662,8 +661,7 @@ def reader_of(lines: Iterable[str], delimiter: str) -> Any:
     """Return a reader of records, by the csv module."""
     if delimiter == " ":  # any number of blanks or tabs, as R's write.table writes
         lines = (line.rstrip(" \t\r\n").replace("\t", " ") for line in lines)
-    is_skipped = delimiter != "\t"
-    return csv.reader(lines, delimiter=delimiter, skipinitialspace=is_skipped)
+    return csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter != "\t")
 
 
 def _is_blank(record: list[str]) -> bool:

@@ -57,8 +57,7 @@ def first_screen(
     ]
     if is_text:
         at, text = result_sentence(answered, items)
-        lines = (*text.splitlines(), *tables[at].notes)
-        tables[at] = replace(tables[at], notes=lines)
+        tables[at] = replace(tables[at], notes=(*text.splitlines(), *tables[at].notes))
         tables[0] = replace(tables[0], caption="")
     first, *more = tables
     read, notes = what_was_read(ratings, items, detail), left_out(ratings, questions)
@@ -303,8 +302,7 @@ def _agreement(answer: Answer, items: str) -> str:
     estimate, name = main.estimate, main.title + "," * (", " in main.title)
     in_units = COEFFICIENTS[estimate.coefficient].in_units
     value = partial(number, digits=3, in_units=in_units)
-    same = [row for row in rows if row.title == main.title]
-    if len(same) > 1:
+    if len(same := [row for row in rows if row.title == main.title]) > 1:
         known = [row for row in same if row.estimate.reason is None] or same
         ends = sorted(known, key=lambda row: row.estimate.value)
         low, high = (

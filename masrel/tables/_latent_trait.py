@@ -62,8 +62,7 @@ def _rows(result: "LatentTrait") -> Iterator[dict[str, object]]:
 
 def _notes(result: "LatentTrait") -> Iterator[str]:
     # what the numbers are about, and their unit
-    interval = result.kappa.interval
-    if interval is not None:
+    if (interval := result.kappa.interval) is not None:
         whom = "these items" if interval.target == "raters" else "new items like these"
         yield (
             f"Kappa: agreement of two new raters on {whom}. Low and High: central "
@@ -75,8 +74,7 @@ def _notes(result: "LatentTrait") -> Iterator[str]:
         "grades high; noise is how far the same item is perceived from one time to the "
         "next."
     )
-    thresholds = [quantity.value for quantity in result.thresholds]
-    if len(thresholds) > 1:
+    if len(thresholds := [quantity.value for quantity in result.thresholds]) > 1:
         distance = (thresholds[-1] - thresholds[0]) / (len(thresholds) - 1)
         yield (
             f"Neighbouring thresholds are {number(distance, 2)} apart on average: a "

@@ -70,8 +70,7 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
         if not hidden.get(column.key)
         and any(row.get(column.key) is not None for row in rows)
     ]
-    notes = _notes(plans)
-    return table_of("plan", caption, columns, rows, notes=notes, data="foreign")
+    return table_of("plan", caption, columns, rows, notes=_notes(plans), data="foreign")
 
 
 def _row(plan: Plan) -> dict[str, Any]:

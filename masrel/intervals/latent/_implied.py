@@ -55,8 +55,7 @@ class Agreement:
 def grade_probabilities(traits: Traits) -> Floats:
     """Return how likely a new rater gives each grade to each of the items."""
     # -> (n, n_items, n_categories)
-    away = traits.thresholds[:, None, :] - traits.severity[:, :, None]
-    return _shares(traits, away)
+    return _shares(traits, traits.thresholds[:, None, :] - traits.severity[:, :, None])
 
 
 def agreement_on_items(traits: Traits) -> Agreement:

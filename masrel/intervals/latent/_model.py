@@ -362,8 +362,7 @@ class LatentDensity:
         with np.errstate(all="ignore"):
             point = self.point(position)
             slope = self._prior_slopes(point, *self._likelihood_slopes(point))
-        known = np.isfinite(slope).all(axis=1, keepdims=True)
-        return np.where(known, slope, 0.0)
+        return np.where(np.isfinite(slope).all(axis=1, keepdims=True), slope, 0.0)
 
     def _likelihood_slopes(
         self, point: UnconstrainedPoint
@@ -404,8 +403,7 @@ class LatentDensity:
         # of the prior by θ_i and by τ_k
         item = np.where(placed, -point.severity / share, 0.0)
         tau = -point.tau
-        more = self.prior.concentration - 1.0
-        if more:
+        if more := self.prior.concentration - 1.0:
             over = 1.0 / grade_shares(point.tau)
             tau = more * _normal_density(point.tau) * (over[:, :-1] - over[:, 1:]) + tau
         # by u_i of placed items, by y_i, and through ρ'

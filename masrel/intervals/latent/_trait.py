@@ -323,8 +323,7 @@ def fit_latent(
 
     def agreement(positions: Floats) -> Agreement:
         if items == "random":
-            some = density.traits(_some(positions, _MAX_KAPPAS))
-            return agreement_on_new_items(some)
+            return agreement_on_new_items(density.traits(_some(positions, _MAX_KAPPAS)))
         flat = positions.reshape(-1, density.n_dimensions)
         return agreement_on_items(density.traits(flat))
 
@@ -333,14 +332,15 @@ def fit_latent(
         # Severities and thresholds can all move together: from the mean of these items
         # they are known better than from the mean of their population.
         centre = traits.severity.mean(axis=1, keepdims=True)
-        shares = (traits.item_share, traits.bias_variance, traits.noise_variance)
         columns = {
             "kappa": agreement(positions).kappa[:, None],
             "severity": traits.severity - centre,
             "bias": traits.bias,
             "noise": traits.noise,
             "thresholds": traits.thresholds - centre,
-            "shares": np.column_stack(shares),
+            "shares": np.column_stack(
+                (traits.item_share, traits.bias_variance, traits.noise_variance)
+            ),
             "noise_spread": traits.noise_spread[:, None],
         }
         n_chains = len(positions)
