@@ -101,17 +101,17 @@ def doubt_columns(
     if not (options.names_at or sheet.is_transposed):
         findings += _second_header(sheet, codes, scale, freq)
     # an item that is there twice is refused below, and no column is one of raters
-    is_long = any(
+    is_long = options.repeated == "error" and layout.session == layout.by is None
+    is_long &= any(
         len(sheet.columns[p].texts) < len(sheet.numbers) for p in layout.item[:1]
     )
-    is_long &= options.repeated == "error" and layout.session == layout.by is None
     if layout.criteria:
         _refuse_scales(sheet, layout, codes)
     if not (are_named or is_long):
         findings += _no_raters(sheet, layout, options, codes, scale, freq)
-    n_items = len(sheet.numbers)
-    if layout.is_item_guessed and len(names) > 2 * n_items and not sheet.is_transposed:
-        findings.append(Finding("many raters", n=len(names), n_items=n_items))
+    n, n_items = len(names), len(sheet.numbers)
+    if layout.is_item_guessed and n > 2 * n_items and not sheet.is_transposed:
+        findings.append(Finding("many raters", n=n, n_items=n_items))
     are_numbers = all(map(is_number, scale.grades))
     if are_numbers and not are_named and layout.frequency is None:
         findings += _looks_counted(sheet, names, codes, scale, freq)
@@ -328,8 +328,7 @@ def _is_no_rater(sheet: Sheet, place: int, lower: set[str]) -> bool:
     name, cells = sheet.header[place], {*sheet.columns[place].texts}
     words = _words(name)
     is_flag = bool(words & _FLAGS) and len(cells - {*USUAL_MISSING}) <= 2
-    is_sum = _is_sum(words)
-    is_sum &= not _is_of_series(name, sheet.header)
+    is_sum = _is_sum(words) and not _is_of_series(name, sheet.header)
     # Kim=Lee, mean of Kim and Lee
     of_two = len((words & lower) - {name.lower()}) > 1
     is_other = bool(words & _SURE or _OTHERS.fullmatch(name))
@@ -382,11 +381,11 @@ def _looks_counted(
         return []
     sums = values[codes].sum(axis=1)
     total = sums.max()
-    has_zeros = 0 in scale.values or bool((codes < 0).any())
-    has_zeros |= all(map(is_number, names))  # as names of grades are
-    is_most = values.max() == total
-    is_most &= np.average(sums == total, weights=freq) >= 1 / 2
-    if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
+    # names of grades are numbers
+    has_zeros = 0 in scale.values or (codes < 0).any() or all(map(is_number, names))
+    share = np.average(sums == total, weights=freq)
+    is_most = share == 1.0 or (values.max() == total and share >= 1 / 2)
+    if total < 2 or not has_zeros or not is_most:
         return []
     finding = Finding("counts", total=total, names=few(names))
     is_sure = freq.sum() >= _ENOUGH_ROWS and len(names) <= _MANY_CATEGORIES

@@ -225,8 +225,7 @@ def _refuse_plus(number: dict[str, Decimal | None], refuse: _Refuse) -> None:
 
 def _truth(written: dict[str, str], refuse: _Refuse) -> dict[str, str]:
     # true and false beside 0 and 1: these numbers, if there are no other grades
-    number = {"true": "1", "false": "0"}
-    truths = {t: number[t.lower()] for t in written if t.lower() in number}
+    truths = {t: _TRUTH[t.lower()] for t in written if t.lower() in _TRUTH}
     values = {Decimal(text) for text in written.values() if is_number(text)}
     if not truths or values.isdisjoint({0, 1}):
         return {}
@@ -243,14 +242,14 @@ def _sets(texts: Sequence[str], separator: str, refuse: _Refuse) -> dict[str, st
     # a semicolon is in the text of a set
     if wrong := [t for t in texts if not is_there or (";" in t and mark != ";")]:
         raise refuse("no set", wrong, separator=separator)
-    labels = {}
+    labels: dict[str, str] = {}
     for text in texts:
         # [x, y] as lists are written, with quotes or without
         is_list = re.fullmatch(r"\[.*\]|\{.*\}", text)
         parts = (text[1:-1] if is_list else text).split(mark)
         ends = "'\" " if is_list else None
         labels[text] = text_of_set({part.strip(ends) for part in parts} - {""})
-    return dict(labels)
+    return labels
 
 
 def _observed(
@@ -264,11 +263,10 @@ def _observed(
         grades = tuple(sorted(shortest.values(), key=Decimal))
         grade_of = {text: shortest[value] for text, value in number.items()}
         return grade_of, Scale(name="observed", grades=grades)
-    scale = Scale(name="observed", grades=tuple(sorted(number)))
     # No other scale has a grade 1+: its order is known, and its other grades.
-    if "1+" in number and number.keys() <= set(MODIFIED_ASHWORTH.grades):
-        scale = MODIFIED_ASHWORTH
-    return {text: text for text in number}, scale
+    is_mas = "1+" in number and number.keys() <= set(MODIFIED_ASHWORTH.grades)
+    observed = Scale(name="observed", grades=tuple(sorted(number)))
+    return {text: text for text in number}, MODIFIED_ASHWORTH if is_mas else observed
 
 
 # ---- numbers: their unit, their thousands marks, their decimal mark ----
@@ -298,9 +296,6 @@ def _numbers_of(
         commas = [text for text, n in written.items() if _DECIMAL_COMMA.fullmatch(n)]
         if commas and all(re.fullmatch(f"[+-]?{_DIGITS}", n) for n in written.values()):
             raise refuse("decimal comma", commas)
-    truths = {text: _TRUTH.get(text.casefold(), text) for text in texts}
-    if marks and {"0", "1"} & written.keys() and set(truths.values()) <= {"0", "1"}:
-        numbers.written = truths
     return numbers
 
 
@@ -488,10 +483,10 @@ def _doubts(
     freq: Counter[str] = Counter()
     for text, n in met.items():
         freq[grade_of[text]] += n
-    findings = []
-    for group in spelled_alike(list(freq)):
-        grades = ", ".join(f"{text!r} ×{freq[text]}" for text in group)
-        findings.append(Finding("alike grades", grades=grades))
+    findings = [
+        Finding("alike grades", grades=", ".join(f"{t!r} ×{freq[t]}" for t in group))
+        for group in spelled_alike(list(freq))
+    ]
     numbers = [text for text in met if number[text] is not None]
     others = [text for text in met if number[text] is None]
     n_ratings = sum(freq.values())
@@ -513,12 +508,10 @@ def _doubts(
         strays = [t for t in others if not _HALF_GRADE.fullmatch(t)]
         strays = [text for text in strays if normal_form(text) not in forms]
         code = "no number"
-    if strays:
-        finding = Finding(
-            code, got=listed(strays), where=where(strays[0]), hint=_hint(strays, met)
-        )
-        findings.append(finding)
-    return findings
+    return findings + [
+        Finding(code, got=listed(strays), where=where(first), hint=_hint(strays, met))
+        for first in strays[:1]
+    ]
 
 
 def _hint(texts: Sequence[str], freq: Mapping[str, int]) -> str:

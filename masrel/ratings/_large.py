@@ -119,10 +119,8 @@ def _parquet(path: Path, options: Reading) -> Source:
     about = file.metadata
     if not options.stream and about.num_rows * about.num_columns < _LARGE_TABLE:
         raise NoStreamError("it fits the memory")
-    first, table = (
-        islice(file.iter_batches(_HEAD_ROWS), 1),
-        library(name, "pyarrow").Table,
-    )
+    first = islice(file.iter_batches(_HEAD_ROWS), 1)
+    table = library(name, "pyarrow").Table
     read = partial(table.from_batches, first, file.schema_arrow)
     head = read_foreign(name, ".parquet", read)
     facts = {"format": "parquet"}
@@ -194,11 +192,10 @@ def _text(path: Path, options: Reading) -> Source:
 
 def _lines(path: Path, n_before: int) -> Iterator[str]:
     with path.open("rb") as file:
-        for number, line in enumerate(file):
-            if number >= n_before:
-                # at a carriage return, too, as where a file is read as a whole
-                text = decoded(str(path), line, None, number)
-                yield from io.StringIO(text, newline="")
+        for number, line in islice(enumerate(file), n_before, None):
+            # at a carriage return, too, as where a file is read as a whole
+            text = decoded(str(path), line, None, number)
+            yield from io.StringIO(text, newline="")
 
 
 def _sha256(path: Path) -> str:
@@ -237,8 +234,7 @@ def database_of(
                     share = max(database.query_progress(), 0.0) / 100.0
                     progress(int(share * size), size)
                 progress(size, size)
-                answered: dict[str, NDArray[Any]] = work.result()
-                return answered
+                return dict(work.result())
             except duckdb.OutOfMemoryException as error:
                 raise MemoryError(str(error).splitlines()[0]) from error
             except duckdb.Error as error:
@@ -334,10 +330,9 @@ def _refuse_names(answer: Answer, groups: Sheet, places: list[int]) -> None:
             f"{_NAME.format(_cell(place))} = {_quoted(name)}"
             for place, name in enumerate(groups.header)
         )
-        for n in answer(f"SELECT n FROM cells WHERE {is_name} ORDER BY n")[
-            "n"
-        ].tolist():
-            raise groups.refuse("names again", groups.at(n + 1))
+        found = answer(f"SELECT min(n) AS n FROM cells WHERE {is_name}")["n"]
+        if not np.ma.is_masked(found):
+            raise groups.refuse("names again", groups.at(int(found[0]) + 1))
 
 
 def patterns(

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -38,6 +38,7 @@ _MAY_BE_BOTH = (
     {"clusters", "item"},
 )
 
+_ROLES = ("by", "clusters", "frequency")  # of columns that are only used when named
 _MANY_TEXTS = 1000  # of grades, unless most are numbers
 # Names of columns that name raters have one of these words.
 _RATER = re.compile(
@@ -109,31 +110,27 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
                 options=f"--{one}, --{other}",
                 column=sheet.header[min(both)],
             )
-    taken = set(named.get("ignore", ()))
-    session = named.get("session") or _usual(sheet, "session", taken)
-    by, clusters = named.get("by", ()), named.get("clusters", ())
-    often = named.get("frequency", ())
-    taken |= {*session, *by, *clusters} - ({*clusters} & {*named.get("item", ())})
-    taken |= {*often}
+    ignored, item = {*named.get("ignore", ())}, named.get("item", ())
+    session = named.get("session") or _usual(sheet, "session", ignored)
+    by, clusters, often = (named.get(role, ()) for role in _ROLES)
+    taken = {*session, *by, *clusters} - ({*clusters} & {*item})
+    taken |= {*ignored, *often}
     is_counted = options.counts or options.table
     # the corner of a transposed table names its rows, which are now its columns
     is_wide = is_counted or "raters" in named or options.no_item or bool(often)
-    is_wide |= options.by_criterion
     is_wide |= sheet.is_transposed and not {"rater", "grade"} & named.keys()
-    layout = None if is_wide else _long(sheet, options, named, taken)
+    layout = None
     if options.by_criterion:
-        layout = _of_criteria(sheet, options, named.get("item", ()), taken)
-    if layout is None:
-        layout = _wide(sheet, options, named, taken)
-    roles = (*layout.item, *layout.raters, *layout.grades, *session, *by, *clusters)
-    _refuse_names(sheet, {*roles, *often})
-    return replace(
-        layout,
-        session=None if is_counted or not session else session[0],
-        by=by[0] if by else None,
-        clusters=clusters[0] if clusters else None,
-        frequency=often[0] if often else None,
-    )
+        layout = _of_criteria(sheet, options, item, taken)
+    elif not is_wide:
+        layout = _long(sheet, options, named, taken)
+    layout = layout or _wide(sheet, options, named, taken)
+    roles = (layout.item, layout.raters, layout.grades, session, by, clusters, often)
+    _refuse_names(sheet, set().union(*roles))
+    first: dict[str, Any] = {role: named[role][0] for role in _ROLES if role in named}
+    if session and not is_counted:
+        first["session"] = session[0]
+    return replace(layout, **first)
 
 
 def _refuse_names(sheet: Sheet, used: set[int]) -> None:

@@ -236,11 +236,9 @@ def finished(sheet: Sheet, options: Reading) -> Sheet:
                 unit="column",
                 line_of=lambda number: number + 1,
             )
-        if options.no_header:
-            header = [str(n) for n in range(1, len(cells) + 1)]
-        else:
-            header = [name for name, *_ in cells]
-            cells = [rest for _, *rest in cells]
+        header = [str(n) for n in range(1, len(cells) + 1)]
+        if not options.no_header:
+            header, cells = [of[0] for of in cells], [of[1:] for of in cells]
         columns = [Column.of(np.arange(len(rows)), rows) for rows in cells]
     header = [re.sub(r"\s*[\r\n]\s*", " ", name.strip()) for name in header]
     # a separator at the end of every line makes a column without name and cells
@@ -271,12 +269,13 @@ def bytes_of(path: Path | str) -> bytes:
     if str(path) == "-":
         return sys.stdin.buffer.read()
     path = Path(path)
-    if not path.exists():
-        raise refusal(str(path), "absent")
-    if path.is_dir():
-        raise refusal(str(path), "folder")
-    if path.is_char_device() or path.is_block_device():  # which may have no end
-        raise refusal(str(path), "device")
+    for code, is_so in (
+        ("absent", not path.exists()),
+        ("folder", path.is_dir()),
+        ("device", path.is_char_device() or path.is_block_device()),  # without an end
+    ):
+        if is_so:
+            raise refusal(str(path), code)
     return path.read_bytes()
 
 
@@ -518,9 +517,9 @@ def without_notes(
 ) -> tuple[str, tuple[Finding, ...]]:
     """Return a text without the notes below its table, and what the first is."""
     lines = [] if delimiter == " " else list(io.StringIO(text[-TAIL:], newline=""))
-    rows: list[list[str]]
-    rows = [next(reader_of([line], delimiter), []) for line in lines]
-    n_back, note = notes_below(rows)
+    n_back, note = notes_below(
+        [next(reader_of([line], delimiter), []) for line in lines]
+    )
     end = len(text) - sum(map(len, lines[len(lines) - n_back :]))
     if not note or text.count('"', 0, end) % 2:  # it is in a cell
         return text, ()
@@ -537,10 +536,8 @@ def _below_comments(name: str, text: str, start: int, delimiter: str | None) -> 
         return start
     n_above = max(k for k, line in enumerate(head) if line[0] == "#")
     last, end = (start + sum(map(len, part)) for part in (head[:n_above], head))
-    two_lines = (
-        head[n_above].rstrip("\r\n"),
-        next(io.StringIO(text[end:], newline=""), ""),
-    )
+    below = next(io.StringIO(text[end:], newline=""), "")
+    two_lines = head[n_above].rstrip("\r\n"), below
     for mark in [delimiter] if delimiter else [",", ";", "\t", "|"]:
         n_cells, n_below = (len(next(reader_of([of], mark), ())) for of in two_lines)
         is_meant = mark != " " or not two_lines[0].startswith("# ")
@@ -636,10 +633,12 @@ def notes_below(rows: Sequence[Sequence[str]]) -> tuple[int, str]:
     n = next((k for k, row in enumerate(reversed(filled)) if len(row) != 1), 0)
     above, notes = filled[: len(filled) - n], [*chain(*filled[len(filled) - n :])]
     # a lone rating is a number, or there above, or right below the names
-    are_notes = all(any(map(str.isalpha, note)) for note in notes)
-    are_notes &= sum(map(bool, above)) > 1
-    are_notes &= (
-        0 < n <= _MOST_NOTES and not above[-1] and not {*notes} & {*chain(*above)}
+    are_notes = (
+        0 < n <= _MOST_NOTES
+        and not above[-1]
+        and sum(map(bool, above)) > 1
+        and not {*notes} & {*chain(*above)}
+        and all(any(map(str.isalpha, note)) for note in notes)
     )
     return (len(rows) - len(above), notes[0]) if are_notes else (0, "")
 
@@ -694,11 +693,11 @@ def _separator(
     lines = list(islice(io.StringIO(text, newline=""), 5 * SNIFFED))
     marks = [delimiter] if delimiter else DELIMITERS
     heads = {
-        mark: [row for row in islice(rows, SNIFFED) if row.cells]
+        mark: rows
         for mark in marks
-        for rows in [_placed(reader_of(lines, mark), n_before)]
+        for placed in [_placed(reader_of(lines, mark), n_before)]
+        if (rows := [row for row in islice(placed, SNIFFED) if row.cells])
     }
-    heads = {mark: rows for mark, rows in heads.items() if rows}
     if not heads:
         raise refusal(name, "no records")
     widths = {mark: len(rows[0].cells) for mark, rows in heads.items()}
