@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel._input import USUAL_NAMES, check_option, shown
+from masrel._input import USUAL_NAMES, check_option, refuse, shown
 from masrel.agreement._labels import (
     MISSING,
     Codes,
@@ -115,10 +115,8 @@ def code_ratings(
     [[0, 1], [2, -1]]
     """
     if isinstance(ratings, CountedRatings):
-        if not ratings.knows_raters:
-            raise RatingsError(
-                "ratings: needs to know who rated what, got counts of a table"
-            )
+        needed = "ratings: needs to know who rated what, got counts of a table"
+        refuse((not ratings.knows_raters, needed), error=RatingsError)
         ratings = ratings.coded
     if isinstance(ratings, CodedRatings):
         check_scale(ratings.categories, categories)
@@ -308,11 +306,14 @@ def side_by_side(first: Any, second: Any) -> Any:
             "ratings, other: needs the labels of two raters, a sequence each, or one "
             f"table alone, got {type(first).__name__} and {type(second).__name__}"
         )
-    if lengths[0] != lengths[1]:
-        raise RatingsError(
+    refuse(
+        (
+            lengths[0] != lengths[1],
             "ratings, other: needs a label of every item from both raters, in one "
-            f"order, or None, got {lengths[0]} and {lengths[1]} labels"
-        )
+            f"order, or None, got {lengths[0]} and {lengths[1]} labels",
+        ),
+        error=RatingsError,
+    )
     if hasattr(first, "iloc") and hasattr(second, "iloc"):
         if not first.index.equals(second.index):
             raise RatingsError(
@@ -388,16 +389,18 @@ def code_long(
     [[0, 1], [2, -1]]
     """
     check_option("repeated", repeated, get_args(Repeated))
-    if not hasattr(frame, "columns") or not hasattr(frame, "iloc"):
-        raise RatingsError(f"frame: needs a DataFrame, got {type(frame).__name__}")
-    for name in (item, rater, grade):
-        if name not in frame.columns:
-            raise RatingsError(
-                f"ratings: needs a column {name!r}, got "
-                f"{', '.join(map(repr, frame.columns))}"
-            )
-    if not len(frame):
-        raise RatingsError(f"{_NOTHING}, got no row")
+    is_frame = hasattr(frame, "columns") and hasattr(frame, "iloc")
+    got = f"got {type(frame).__name__}"
+    refuse((not is_frame, f"frame: needs a DataFrame, {got}"), error=RatingsError)
+    got = f"got {', '.join(map(repr, frame.columns))}"
+    refuse(
+        *(
+            (name not in frame.columns, f"ratings: needs a column {name!r}, {got}")
+            for name in (item, rater, grade)
+        ),
+        (not len(frame), f"{_NOTHING}, got no row"),
+        error=RatingsError,
+    )
     items, item_names = _named(frame[item], item)
     raters, rater_names = _named(frame[rater], rater)
     scale = None if categories is None else check_categories(categories)
@@ -419,10 +422,8 @@ def code_long(
 
 def _named(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
     places, names = column.factorize()
-    if places.min() < 0:
-        raise RatingsError(
-            f"ratings: row {np.argmin(places)}, column {name!r}: needs a name, got none"
-        )
+    where = f"ratings: row {np.argmin(places)}, column {name!r}"
+    refuse((places.min() < 0, f"{where}: needs a name, got none"), error=RatingsError)
     return places, names
 
 
@@ -444,11 +445,11 @@ def code_pairs(
     """Check pairs of ratings per rater and lay them side by side as codes."""
     # Takes pairs (n_raters, n_items, 2)
     if isinstance(pairs, CodedRatings):
-        if pairs.codes.shape[1] % 2:
-            raise RatingsError(
-                "pairs: needs two columns of ratings per rater, got "
-                f"{pairs.codes.shape[1]} columns"
-            )
+        n_columns = pairs.codes.shape[1]
+        needed = (
+            f"pairs: needs two columns of ratings per rater, got {n_columns} columns"
+        )
+        refuse((n_columns % 2, needed), error=RatingsError)
         return code_ratings(pairs, categories)
     if not is_row(pairs):
         raise RatingsError(
@@ -843,10 +844,8 @@ def check_table(table: ArrayLike) -> Integers:
     """Check a contingency table of two raters."""
     # table (n_categories, n_categories) -> (n_categories, n_categories)
     checked = check_counts(table)
-    if checked.shape[0] != checked.shape[1]:
-        raise CountsError(
-            f"table: needs as many rows as columns, got shape {checked.shape}"
-        )
+    needed = f"table: needs as many rows as columns, got shape {checked.shape}"
+    refuse((checked.shape[0] != checked.shape[1], needed), error=CountsError)
     return checked
 
 
@@ -862,14 +861,16 @@ def _column_categories(
     categories: Sequence[Label] | None, n_columns: int
 ) -> tuple[Label, ...]:
     # the declared scale of a table of counts, 1 to n_columns unless given
-    if categories is None:
-        return tuple(range(1, n_columns + 1))
-    declared = check_categories(categories)
-    if len(declared) != n_columns:
-        raise ParameterError(
+    declared = check_categories(
+        range(1, n_columns + 1) if categories is None else categories
+    )
+    refuse(
+        (
+            len(declared) != n_columns,
             f"categories: needs {n_columns}, one per column of counts, got "
-            f"{len(declared)}"
+            f"{len(declared)}",
         )
+    )
     return declared
 
 
@@ -912,6 +913,4 @@ def complete_values(ratings: Any, categories: Sequence[Label] | None) -> Floats:
 def rated_part(values: Floats) -> Floats:
     """Return the table without items and raters that have no rating."""
     rated = ~np.isnan(values)
-    if rated.all():
-        return values
     return np.asarray(values[np.ix_(rated.any(axis=1), rated.any(axis=0))])

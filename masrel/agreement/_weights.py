@@ -338,8 +338,7 @@ def _named(name: str, categories: tuple[Label, ...]) -> Weights:
         reason = "0/0: a scale of one category has no weights but identity"
     elif n and name in _LINES:
         x = np.arange(float(n)) if name == "ordinal" else spread_values(categories)
-        linear, square = _LINES[name]
-        span = float(np.ptp(x))
+        (linear, square), span = _LINES[name], float(np.ptp(x))
         scale = span * (linear + square * span)  # the largest is 1
         line = Line(x, linear=linear, square=square, scale=scale)
         v = line.matrix() if n <= MANY else line
@@ -374,12 +373,11 @@ def category_values(categories: Sequence[Label]) -> Floats:
     if isinstance(categories[0], str):
         return np.arange(1.0, len(categories) + 1.0)
     try:
-        values = np.array(categories, dtype=np.float64)
+        return np.array(categories, dtype=np.float64)
     except (OverflowError, TypeError, ValueError) as error:
         raise ParameterError(
             f"categories: needs numbers that floats hold, got {shown(categories)}"
         ) from error
-    return values
 
 
 def spread_values(categories: Sequence[Label]) -> Floats:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel._input import check_option, shown
 from masrel.agreement._engine import (
@@ -241,12 +242,10 @@ def holm(p_values: Sequence[float]) -> list[float]:
     >>> holm([0.03, 0.01, 0.02])
     [0.04, 0.03, 0.04]
     """
-    adjusted = _checked_p_values(p_values)
-    known = np.flatnonzero(~np.isnan(adjusted))
-    ascending = known[np.argsort(adjusted[known])]
-    steps = adjusted[ascending] * np.arange(len(known), 0, -1)
-    adjusted[ascending] = np.maximum.accumulate(np.minimum(steps, 1.0))
-    return [float(p) for p in adjusted]
+    p, ascending = _checked_p_values(p_values)
+    steps = p[ascending] * np.arange(len(ascending), 0, -1)
+    p[ascending] = np.maximum.accumulate(np.minimum(steps, 1.0))
+    return list(map(float, p))
 
 
 def benjamini_yekutieli(p_values: Sequence[float]) -> list[float]:
@@ -284,12 +283,10 @@ def benjamini_yekutieli(p_values: Sequence[float]) -> list[float]:
     >>> [round(p, 4) for p in benjamini_yekutieli([0.03, 0.01, 0.02])]
     [0.055, 0.055, 0.055]
     """
-    adjusted = _checked_p_values(p_values)
-    known = np.flatnonzero(~np.isnan(adjusted))
-    descending = known[np.argsort(-adjusted[known])]
-    steps = adjusted[descending] / _yekutieli_bounds(len(known))[::-1]
-    adjusted[descending] = np.minimum.accumulate(np.minimum(steps, 1.0))
-    return [float(p) for p in adjusted]
+    p, ascending = _checked_p_values(p_values)
+    steps = p[ascending] / _yekutieli_bounds(len(ascending))
+    p[ascending[::-1]] = np.minimum.accumulate(np.minimum(steps[::-1], 1.0))
+    return list(map(float, p))
 
 
 def _yekutieli_bounds(m: int) -> Floats:
@@ -298,7 +295,8 @@ def _yekutieli_bounds(m: int) -> Floats:
     return np.asarray(ranks / (m * (1.0 / ranks).sum()))  # theorem 1.3
 
 
-def _checked_p_values(p_values: Sequence[float]) -> Floats:
+def _checked_p_values(p_values: Sequence[float]) -> tuple[Floats, NDArray[np.intp]]:
+    """Return p-values, and the places of those that are known, ascending."""
     if not is_row(p_values):
         raise ParameterError(f"p_values: needs a sequence, got {shown(p_values)}")
     p_values = list(p_values)
@@ -308,7 +306,8 @@ def _checked_p_values(p_values: Sequence[float]) -> Floats:
             raise ParameterError(
                 f"p_values: place {place}: needs [0, 1], got {shown(p)}"
             )
-    return np.array(p_values, dtype=float)
+    checked = np.array(p_values, dtype=float)
+    return checked, np.argsort(checked)[: int((~np.isnan(checked)).sum())]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

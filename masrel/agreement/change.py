@@ -210,9 +210,7 @@ def stuart_maxwell(table: ArrayLike) -> Significance:
     >>> print(stuart_maxwell([[10, 5], [1, 10]]))
     stuart_maxwell: 2.667, chi-squared(1), p = 0.102
     """
-    cells = check_table(table)
-    margins = _margin_statistic(cells)
-    return _chi_squared("stuart_maxwell", _SAME_MARGINS, *margins, int(cells.sum()))
+    return _chi_squared("stuart_maxwell", _SAME_MARGINS, *_margins(table))
 
 
 def bhapkar(table: ArrayLike) -> Significance:
@@ -253,34 +251,33 @@ def bhapkar(table: ArrayLike) -> Significance:
     >>> print(bhapkar([[10, 5], [1, 10]]))
     bhapkar: 2.971, chi-squared(1), p = 0.0847
     """
-    cells = check_table(table)
-    n = int(cells.sum())
-    statistic, df = _margin_statistic(cells)
+    statistic, df, n = _margins(table)
     # all items changed one way, but for rounding
     is_infinite = df > 0 and statistic >= n * (1.0 - 1e-12)
     statistic = math.inf if is_infinite else statistic / (1.0 - statistic / max(n, 1))
     return _chi_squared("bhapkar", _SAME_MARGINS, statistic, df, n)
 
 
-def _margin_statistic(cells: NDArray[np.int64]) -> tuple[float, int]:
-    # d' V⁻ d, d = t_k. - t_.k, V_kk = t_k. + t_.k - 2 t_kk and V_kl = -t_kl - t_lk.
+def _margins(table: ArrayLike) -> tuple[float, int, int]:
+    # Statistic, degrees of freedom and items: d' V⁻ d, d = t_k. - t_.k,
+    # V_kk = t_k. + t_.k - 2 t_kk and V_kl = -t_kl - t_lk.
     # V is the Laplacian of the graph of changes: it is singular once per group of
     # categories that changes connect, and d adds up to 0 in each.
+    cells = check_table(table)
     changes = cells + cells.T
     np.fill_diagonal(changes, 0)
     laplacian = np.diag(changes.sum(axis=1)) - changes
     d = cells.sum(axis=1) - cells.sum(axis=0)
     solution, _, df, _ = np.linalg.lstsq(laplacian, d, rcond=1e-12)
-    return float(d @ solution), int(df)
+    return float(d @ solution), int(df), int(cells.sum())
 
 
 def _chi_squared(
     name: str, hypothesis: str, statistic: float, df: int, n_items: int
 ) -> Significance:
     """Refer a statistic of two ratings' changes to chi-squared."""
-    reason = None
-    if df == 0 or math.isnan(statistic):
-        reason = undefined(name, "0/0: no item changed")
+    has_none = df == 0 or math.isnan(statistic)
+    reason = undefined(name, "0/0: no item changed") if has_none else None
     return tested(
         name, hypothesis, "chi-squared", (float(df),), n_items, statistic, reason
     )
@@ -399,13 +396,10 @@ def kappa_max(table: ArrayLike) -> float:
     cells = check_table(table)
     # whole numbers of Python, of which products have all their digits
     first, second = cells.sum(axis=1).tolist(), cells.sum(axis=0).tolist()
-    n = sum(first)
-    if n == 0:
-        return _no_number("the largest kappa")
-    agreeing = sum(map(min, first, second))
+    n, agreeing = sum(first), sum(map(min, first, second))
     by_chance = sum(r * c for r, c in zip(first, second, strict=True))
     if by_chance == n * n:
-        return _no_number("the largest kappa", NO_CHANCE)
+        return _no_number("the largest kappa", NO_CHANCE if n else NO_PAIR)
     return float((n * agreeing - by_chance) / (n * n - by_chance))
 
 

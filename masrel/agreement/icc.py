@@ -279,11 +279,11 @@ def variance_components(
         fit = components(values, has_raters=True)
     elif fit is None:  # from mean squares to what they are made of
         of = _Anova.of(values)
-        items, raters = (
-            (of.items - of.residual) / of.k,
-            (of.raters - of.residual) / of.n,
+        fit = replace(
+            of,
+            items=(of.items - of.residual) / of.k,
+            raters=(of.raters - of.residual) / of.n,
         )
-        fit = replace(of, items=items, raters=raters)
     if isinstance(fit, str):
         reason = undefined("the variances of ratings", fit)
         return VarianceComponents(method=method, reason=reason)
@@ -704,11 +704,12 @@ def _ends(
     if error == 0.0 and not (absolute and anova.raters > 0.0):
         return 1.0, 1.0, None
     if absolute:
-        if not anova.denominator("ICC(A,1)") > 0.0:
-            return math.nan, math.nan, "the total variance is estimated as less than 0"
-        if not anova.denominator(form) > 0.0:
-            why = "the variance of the raters' mean is estimated as less than 0"
-            return math.nan, math.nan, why
+        for of, what in (
+            ("ICC(A,1)", "total variance"),
+            (form, "variance of the raters' mean"),
+        ):
+            if not anova.denominator(of) > 0.0:
+                return math.nan, math.nan, f"the {what} is estimated as less than 0"
         if by_f:
             low, high = _f_ends(anova, level)
         else:
@@ -764,13 +765,11 @@ def _with_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Ans
     error = fit.residual + (fit.raters if absolute else 0.0)
     if fit.items == 0.0 and error == 0.0:
         return math.nan, None, undefined(form, _ALL_ALIKE)
-    k, notes = 1, [fit.words]
-    if form.endswith("k)"):
-        k = fit.n_raters
-        notes.append(
-            f"k is the {k} raters of the table; an item has "
-            f"{fit.n_ratings / fit.n_items:.3g} ratings on average"
-        )
+    k = fit.n_raters if form.endswith("k)") else 1
+    note = (
+        f"k is the {k} raters of the table; an item has "
+        f"{fit.n_ratings / fit.n_items:.3g} ratings on average"
+    )
     low, high = fit.icc_ends(absolute=absolute, level=level)
     interval = Interval(
         low=_stepped_up(low, k),
@@ -779,7 +778,7 @@ def _with_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Ans
         kind="confidence",
         method="REML, profile likelihood",
         target=_icc_target(form),
-        notes=tuple(notes),
+        notes=(fit.words, note) if form.endswith("k)") else (fit.words,),
     )
     return fit.items / (fit.items + error / k), interval, None
 

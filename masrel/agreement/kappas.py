@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from masrel._input import shown
+from masrel._input import refuse, shown
 from masrel.agreement._codes import (
     complete_rows,
     count_items,
@@ -39,7 +39,6 @@ from masrel.agreement._engine import (
 )
 from masrel.agreement._labels import Codes, Label
 from masrel.agreement._weights import WeightsLike, declared_weights
-from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Significance
 
 _MAX_PAIRS = 1 << 20  # of ratings whose disagreement is looked up at once
@@ -689,11 +688,8 @@ def category_kappa(
 
 def _place(category: Label, scale: Sequence[Label]) -> int:
     # of a category in the scale
-    if category not in scale:
-        raise ParameterError(
-            f"category: needs one of {', '.join(map(repr, scale))}, got "
-            f"{shown(category)}"
-        )
+    needed = f"needs one of {', '.join(map(repr, scale))}, got {shown(category)}"
+    refuse((category not in scale, f"category: {needed}"))
     return scale.index(category)
 
 
@@ -799,13 +795,17 @@ def fleiss_null(
     if category is not None:
         chosen = counts[:, _place(category, counted.categories)]
         counts = np.column_stack([chosen, n_raters - chosen])
-    statistic, reason = math.nan, None
-    if n_raters < 2:
-        reason = undefined("fleiss_null", "fewer than two raters")
-    elif len(counts) == 0:
-        reason = undefined("fleiss_null", "no item is rated by every rater")
-    elif (counts.sum(axis=0) > 0).sum() < 2:
-        reason = undefined("fleiss_null", "0/0: all ratings are in one category")
+    why = {
+        "fewer than two raters": n_raters < 2,
+        "no item is rated by every rater": len(counts) == 0,
+        "0/0: all ratings are in one category": (counts.sum(axis=0) > 0).sum() < 2,
+    }
+    statistic, reason = (
+        math.nan,
+        next((text for text, is_so in why.items() if is_so), None),
+    )
+    if reason is not None:
+        undefined("fleiss_null", reason)
     else:
         value = fleiss_kappa(count_items(counts)).value
         statistic = value / _null_error(counts, n_raters)

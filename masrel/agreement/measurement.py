@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from statistics import NormalDist
 from typing import Literal, get_args
 
@@ -379,27 +380,21 @@ def limits_of_agreement(
         mean, sd = float(differences.mean()), float(differences.std(ddof=1))
         widths = _widths(n, share, level)
     middle, near, far, inner, outer = (width * sd for width in widths)
-
-    def interval(low: float, high: float, method: str) -> Interval:
-        return Interval(
-            low=mean + low,
-            high=mean + high,
-            level=level,
-            kind="confidence",
-            method=method,
-            target="items",
-            reason=reason,
-        )
-
+    interval = partial(
+        Interval, level=level, kind="confidence", target="items", reason=reason
+    )
+    of_limit = partial(interval, method=f"noncentral t({n - 1})")
     return LimitsOfAgreement(
         mean=mean,
         sd=sd,
         lower=mean - z * sd,
         upper=mean + z * sd,
         share=share,
-        mean_interval=interval(-middle, middle, f"t({n - 1})"),
-        lower_interval=interval(-far, -near, f"noncentral t({n - 1})"),
-        upper_interval=interval(near, far, f"noncentral t({n - 1})"),
+        mean_interval=interval(
+            low=mean - middle, high=mean + middle, method=f"t({n - 1})"
+        ),
+        lower_interval=of_limit(low=mean - far, high=mean - near),
+        upper_interval=of_limit(low=mean + near, high=mean + far),
         inner=(mean - inner, mean + inner),
         outer=(mean - outer, mean + outer),
         averages=averages,

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option, shown
+from masrel._input import check_option, refuse, shown
 from masrel.agreement._codes import (
     CodedRatings,
     code_pairs,
@@ -195,11 +195,13 @@ class Coefficient:
         """Return the coefficient by one of Krippendorff's metrics; itself for None."""
         if metric is None or metric == self.metric:
             return self
-        if self.name != "krippendorff_alpha":
-            raise ParameterError(
+        refuse(
+            (
+                self.name != "krippendorff_alpha",
                 f"metric: is of krippendorff_alpha alone, got {metric!r} for "
-                f"{self.name}; other coefficients take weights"
+                f"{self.name}; other coefficients take weights",
             )
+        )
         check_option("metric", metric, get_args(Metric))
         is_ordered = metric in ("ordinal", "interval", "ratio")
         order: frozenset[Property] = frozenset({"categories in any order"})
@@ -226,10 +228,8 @@ class Coefficient:
         return Weights(name="identity", n_categories=n, v=v)
 
     def _refuse_weights(self, weights: "WeightsLike") -> None:
-        if not is_identity(weights):
-            raise ParameterError(
-                f"weights: {self.title} takes none, got {shown(weights)}"
-            )
+        takes_none = f"weights: {self.title} takes none, got {shown(weights)}"
+        refuse((not is_identity(weights), takes_none))
 
 
 _RANKS = frozenset[Property](
