@@ -69,12 +69,11 @@ def patterns_interval(
     rows, often = _distinct_features(problem.features(problem.codes), problem.freq)
     added, worth = _prior_patterns(problem)
     rows, shapes = np.concatenate([rows, added]), np.concatenate([often, worth])
-    n_left, values, size = n_draws, [], max(1, _AT_ONCE // shapes.size)
-    while n_left > 0:
-        freq = generator.standard_gamma(shapes, (min(size, n_left), shapes.size))
-        freq *= WITHOUT_END / problem.n_items
+    values, size = [], max(1, _AT_ONCE // shapes.size)
+    for start in range(0, n_draws, size):
+        shape = min(size, n_draws - start), shapes.size
+        freq = generator.standard_gamma(shapes, shape) * (WITHOUT_END / problem.n_items)
         values.append(problem.values(freq @ rows))
-        n_left -= size
     drawn = np.concatenate(values)
     return _interval(problem, drawn, OF_PATTERNS, _PRIOR, one_sided, seed)
 
@@ -104,19 +103,17 @@ def _population(
     # https://doi.org/10.1080/01621459.1995.10476550
     counts = problem.item_counts()
     model = RhoPosterior.of(counts, prior)
-    rho = model.draw(n_draws, generator)
+    rho = model.draw(n_draws, generator)[:, None]
     powers = np.zeros((counts.shape[1], model.sizes.size), dtype=np.int64)
     powers[counts.any(axis=0)] = model.powers
-    depth = np.arange(powers.shape[1])
-    whole = ((1.0 - rho) / rho)[:, None]
-    always, powers, depth = powers[:, 0], powers[:, 1:], depth[1:]
+    always, powers, depth = powers[:, 0], powers[:, 1:], np.arange(1, powers.shape[1])
     t = np.broadcast_to(always, (n_draws, len(always)))  # at least
     for _ in range(_SWEEPS):
         shares = generator.standard_gamma(prior.concentration + t)
         shares /= shares.sum(axis=1, keepdims=True)
-        x = np.maximum(whole * shares, np.finfo(float).tiny)[:, :, None]
+        x = np.maximum((1.0 - rho) / rho * shares, np.finfo(float).tiny)[:, :, None]
         t = always + generator.binomial(powers, x / (x + depth)).sum(axis=2)
-    return rho[:, None], shares
+    return rho, shares
 
 
 def _prior_patterns(problem: IntervalProblem) -> tuple[Floats, Floats]:
@@ -150,7 +147,6 @@ def _interval(
     )
     if one_sided:
         high = (1.0, 0.0)
-    method = f"{method}, {drawn.size} draws"
     # a density from how far apart quantiles are, between which equally many draws lie
     ends = np.quantile(drawn, np.linspace(0.0, 1.0, _SHOWN + 1))
     widths = np.maximum(np.diff(ends), np.finfo(float).tiny)
@@ -160,7 +156,7 @@ def _interval(
         median=draws.quantile(0.5),
         level=problem.level,
         kind="credible",
-        method=f"{method}, one-sided" if one_sided else method,
+        method=f"{method}, {drawn.size} draws{', one-sided' if one_sided else ''}",
         target=problem.target,
         n_resamples=drawn.size,
         n_undefined=values.size - drawn.size,

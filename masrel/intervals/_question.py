@@ -261,7 +261,6 @@ def pose_problem(
         ),
     )
     formula = entry.formula
-    notes: tuple[str, ...] = ()
     if formula is None:
         raise ParameterError(
             f"coefficient: {entry.title} is no function of sums over items: there is "
@@ -271,8 +270,9 @@ def pose_problem(
         made = declared_weights(weights, coded.categories, declared=coded.declared)
     else:
         made = entry.disagreement(coded, weights)
-    if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
-        formula, notes = coefficient(entry.name).formula or formula, (HELD,)
+    is_held = entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE
+    if is_held:
+        formula = coefficient(entry.name).formula or formula
     item_codes, codes, often = _who_matters(entry, formula, made.v, coded)
     v, n_rows = made.v, max(len(item_codes), len(made.v))
     features = formula.features(codes[:1], v)
@@ -293,7 +293,7 @@ def pose_problem(
         coded=coded,
         item_codes=item_codes,
         is_too_large=is_too_large,
-        notes=notes,
+        notes=(HELD,) if is_held else (),
         **_of_rows(entry, formula, v, codes, often),
     )
 
@@ -354,8 +354,7 @@ def _by_nodes(formula: Formula, line: Line) -> Formula | None:
 
     Where v is the square of a distance, the nodes stand for any number of grades.
     """
-    nodes = None if formula.needs_categories else line.nodes()
-    if nodes is None:
+    if formula.needs_categories or (nodes := line.nodes()) is None:
         return None
     shares, v = nodes
 

@@ -22,7 +22,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +40,7 @@ from masrel.intervals._quadrature import (
     where_it_matters,
 )
 from masrel.intervals._question import IntervalProblem
-
-PriorName = Literal["uniform", "jeffreys"]
-"""Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""
+from masrel.intervals.posterior import PriorName
 
 PRIOR_SHAPES: dict[str, float] = {"uniform": 1.0, "jeffreys": 0.5}
 """The prior of ρ is Beta(shape, shape)."""
@@ -131,10 +129,8 @@ class RhoPosterior:
     def of(cls, counts: NDArray[np.int64], prior: Prior) -> "RhoPosterior":
         """Integrate the posterior of counts (n_items, n_categories)."""
         used, n = counts.any(axis=0), counts.sum(axis=1)
-        of_shares = np.full(int(used.sum()), prior.concentration)
-        if not used.all():
-            n_unused = float((~used).sum())
-            of_shares = np.append(of_shares, prior.concentration * n_unused)
+        n_each = [1.0] * int(used.sum()) + [float((~used).sum())] * (not used.all())
+        of_shares = prior.concentration * np.array(n_each)
         met = [
             np.bincount(column, minlength=int(n.max()) + 1)
             for column in (*counts.T[used], n)
@@ -186,8 +182,7 @@ class RhoPosterior:
 
     def quantiles(self, *shares: float) -> list[float]:
         """Return quantiles of ρ."""
-        ends: list[float] = expit(self.logit.quantiles(shares)).tolist()
-        return ends
+        return list(map(float, expit(self.logit.quantiles(shares))))
 
     def draw(self, n_draws: int, generator: np.random.Generator) -> Floats:
         """Draw ρ from as many equal parts of its distribution, ascending."""
@@ -221,11 +216,9 @@ def rho_interval(
     shares = (1.0 - level,) if one_sided else (0.5 - 0.5 * level, 0.5 + 0.5 * level)
     posterior = RhoPosterior.of(counts, prior)
     ends = posterior.quantiles(*shares)
-    why = where_the_prior_weighs(counts)
-    if one_sided:
-        why = "the bound rests on the prior, too"
+    bound = "the bound rests on the prior, too" if one_sided else ""
     notes: tuple[str, ...] = ()
-    if why:
+    if why := bound or where_the_prior_weighs(counts):
         others = [
             (RhoPosterior.of(counts, other).quantiles(*shares), other.description)
             for other in prior.others(counts.shape[1])
@@ -255,12 +248,11 @@ def nothing_to_learn(problem: IntervalProblem) -> str | None:
     if problem.coded.n_categories < 2:
         return "one category is declared"
     # distances, which stand for the matrix of many categories, are all numbers
-    if not isinstance(problem.v, Distances):
-        if np.isnan(problem.v).any():
-            return "the scale has no such weights"
-        if not problem.v.any():
-            return "the weights count nothing as disagreement"
-    return None
+    if isinstance(problem.v, Distances):
+        return None
+    if np.isnan(problem.v).any():
+        return "the scale has no such weights"
+    return None if problem.v.any() else "the weights count nothing as disagreement"
 
 
 def where_the_prior_weighs(counts: NDArray[np.int64]) -> str:

@@ -255,10 +255,8 @@ def table_interval(
     if is_drawn:
         of_high = 0.0 if one_sided else posterior.quantile_error(high)
         errors = (posterior.quantile_error(low), of_high)
-    notes: tuple[str, ...] = ()
     n_single = problem.n_items - problem.n_paired_items
-    if n_single:
-        notes = (f"left out, items of a single rating: {n_single}",)
+    notes = [f"left out, items of a single rating: {n_single}"] * bool(n_single)
     counts = problem.item_counts()
     if why := where_the_prior_weighs(counts[counts.sum(axis=1) > 1]):
         # another prior that is as reasonable
@@ -266,7 +264,7 @@ def table_interval(
         other, other_words = table_prior(None if is_even else 1.0 / q, q)
         _, there, _ = of_cells(table + other, generator=generator, n_draws=_NOTED_DRAWS)
         answers = ([low, high], description), ([*there, 1.0][:3:2], other_words)
-        notes += (prior_note(why, *answers),)
+        notes.append(prior_note(why, *answers))
     way = f"{n_draws} draws" if is_drawn else "exact"
     method = f"Dirichlet posterior of the table of two raters, {way}"
     width = high - low  # the density is shown as far beyond the ends
@@ -281,7 +279,7 @@ def table_interval(
         n_resamples=n_draws if is_drawn else None,
         monte_carlo_error=errors,
         seed=seed,
-        notes=notes,
+        notes=tuple(notes),
         is_one_sided=one_sided,
         prior=description,
         distribution=fewer.distribution(

@@ -207,7 +207,7 @@ def _with_error(
     # it is given below
     with warnings.catch_warnings(action="ignore", category=UndefinedStatisticWarning):
         estimate = problem.entry(problem.coded, weights=weights)
-    unit: Unit | None = None
+    unit: Unit | None = None if clusters is None else "clusters"
     method, error = "delta method", estimate.standard_error
     if problem.entry.has_interval:  # and, beside it, no error of its own
         error = problem.item_features.error(problem.slopes(problem.sums), problem.freq)
@@ -216,12 +216,11 @@ def _with_error(
         method, error = _NAMES[convention], _error_by(convention, problem, estimate)
     method = f"{method}, {_METHODS[distribution]}"
     if clusters is not None:
-        method, unit = f"{method}, of clusters", "clusters"
+        method = f"{method}, of clusters"
         error, n = _clustered_error(problem, cluster_codes(problem, clusters))
-    estimate, lowest = replace(estimate, standard_error=error), None
-    if distribution in ("logit", "fisher"):
-        # artanh x is half the logit of (x + 1)/2, so that both give the same ends
-        lowest = problem.entry.lowest if distribution == "logit" else -1.0
+    estimate = replace(estimate, standard_error=error)
+    # artanh x is half the logit of (x + 1)/2, so that both give the same ends
+    lowest = {"logit": problem.entry.lowest, "fisher": -1.0}.get(distribution)
     reason = estimate.reason or _why_undefined(estimate, error, n, lowest)
     if reason is not None:
         return estimate, problem.undefined(reason, method=method, unit=unit)
@@ -254,8 +253,7 @@ def _clustered_error(problem: IntervalProblem, clusters: Integers) -> tuple[floa
     # Vanbelle, S. (2017). Comparing dependent kappa coefficients obtained on multilevel
     # data. Biometrical Journal, 59(5), 1016-1034. https://doi.org/10.1002/bimj.201600093
     sums, known, n_paired = cluster_sums(problem, clusters)
-    rows = sums[known]
-    none = np.empty((len(rows), 0))
+    rows, none = sums[known], np.empty((known.sum(), 0))
     features = Features(rows.T, none.astype(np.int64), none, 0)
     once = np.ones(len(rows), dtype=np.int64)
     return features.error(problem.slopes(problem.sums), once), n_paired

@@ -31,12 +31,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from masrel._input import check_option
-from masrel.agreement import CountedRatings, Label
+from masrel.agreement import CountedRatings, Label, Metric, WeightsLike
 from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, Integers
 from masrel.errors import ParameterError
 from masrel.estimates import (
@@ -63,10 +63,6 @@ from masrel.intervals.analytic import _clustered_error, analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import _leave_out, _variance_of_cells, jackknife
 from masrel.intervals.posterior import posterior
-
-if TYPE_CHECKING:
-    from masrel.agreement import Metric, WeightsLike
-
 
 # Raters alike, what `posterior` takes unless told, or each rater as he or she is
 _Model = Literal["alike", "usual", "patterns"]
@@ -119,7 +115,7 @@ def estimate(
     method: IntervalMethod = "auto",
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
-    metric: "Metric | None" = None,
+    metric: Metric | None = None,
     level: float = 0.95,
     n_resamples: int = 10_000,
     rng: np.random.Generator | int | None = None,
@@ -267,12 +263,14 @@ def _by_error(problem: IntervalProblem) -> Interval:
     """Compute the interval by the standard error, which needs no item left out."""
     error = problem.item_features.error(problem.slopes(problem.sums), problem.freq)
     df, method = problem.n_paired_items - 1, "delta method, t(n-1)"
-    if error > 0.0 and not np.isnan(problem.value):
-        return problem.by_t(error, df, method=method, unit=None)
-    reason = ONE_PAIR if df < 1 else NO_SPREAD
     if np.isnan(problem.value):
         reason = "the estimate itself is undefined"
-    return problem.undefined(reason, method=method, unit=None)
+        return problem.undefined(reason, method=method, unit=None)
+    if error > 0.0:
+        return problem.by_t(error, df, method=method, unit=None)
+    return problem.undefined(
+        ONE_PAIR if df < 1 else NO_SPREAD, method=method, unit=None
+    )
 
 
 def _choose_interval(
@@ -299,15 +297,13 @@ def _choose_interval(
         return _other_items_and_raters(problem, rule)
     few = problem.n_paired_items < _FEW and problem.n_paired_raters < _FEW
     outside, rare = _outside_commonest(problem)
-    interval = None
-    if (few or rare) and problem.target != "raters":
-        models = rule.models(problem, few=few)
-        interval = reduce(_joined, (_posterior(problem, model) for model in models))
+    is_modelled = (few or rare) and problem.target != "raters"
+    models = rule.models(problem, few=few) if is_modelled else ()
+    interval = reduce(_joined, (_posterior(problem, model) for model in models), None)
     if interval is None:
         return _jackknife_with_spread(problem)
     if few:
-        why = f"few items ({problem.n_paired_items}), where it covers best"
-        return interval, why
+        return interval, f"few items ({problem.n_paired_items}), where it covers best"
     # below so many no method covers everywhere
     notes = warn_small(outside, 5 if problem.unweighted else _SEVERAL, _OUTSIDE)
     what = singular(_OUTSIDE) if outside == 1 else _OUTSIDE
@@ -325,12 +321,12 @@ def _jackknife_with_spread(problem: IntervalProblem) -> tuple[Interval, str]:
     # an accident of few disagreements gives as much
     accident = _ACCIDENT * (1.0 - problem.value) / n_ratings if modelled else 0.0
     if not left_out.variance > accident:
+        interval = None
         if modelled or target == "items":
             interval = _posterior(problem, "usual")
-            if interval is not None:
-                why = "leaving any out says next to nothing, so that a model must"
-                return interval, why
-        return left_out.interval(), "the spread of the units left out"
+        if interval is None:
+            return left_out.interval(), "the spread of the units left out"
+        return interval, "leaving any out says next to nothing, so that a model must"
     if target == "raters":
         return left_out.interval(), "raters left out, one at a time"
     lowest, per_item = problem.entry.lowest, n_ratings / n_items
@@ -392,7 +388,7 @@ def _posterior(problem: IntervalProblem, model: _Model) -> Interval | None:
 def _joined(one: Interval | None, other: Interval | None) -> Interval | None:
     """Return an interval that holds two of one problem."""
     if one is None or other is None:
-        return one
+        return one or other
     return replace(
         other,
         low=min(one.low, other.low),

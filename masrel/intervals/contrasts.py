@@ -16,10 +16,10 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option
+from masrel._input import check_option, refuse
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
 from masrel.agreement._codes import item_counts
-from masrel.agreement._engine import Floats, tested, undefined
+from masrel.agreement._engine import Floats, divide, tested, undefined
 from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
@@ -146,11 +146,12 @@ def difference(
     n_items = smaller.n_items if unit == "items" else None
     notes = warn_small(compared.n_units, 10, unit, n_items)
     width = 1.0 - min(problem.min_value for problem in compared.problems)
-    if value - half < -width or value + half > width:
+    low, high = max(value - half, -width), min(value + half, width)
+    if (low, high) != (value - half, value + half):
         notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)
     interval = Interval(
-        low=max(value - half, -width),
-        high=min(value + half, width),
+        low=low,
+        high=high,
         level=level,
         kind="confidence",
         method=method,
@@ -278,8 +279,9 @@ def _compare(
         variance = _variance_of(of_first - of_second, n_units)
         df = n_units - 1.0
     else:
-        _check_other_clusters(clusters)
-        pair: Any = [None, None] if clusters is None else clusters
+        pair: Any = [None, None]
+        if clusters is not None:
+            pair = _checked_pair(clusters)
         of_sets = [
             _without_units([problem], of)
             for problem, of in zip(problems, pair, strict=True)
@@ -323,11 +325,11 @@ def _compare(
 
 def _check_same_items(problems: Sequence[IntervalProblem], clusters: object) -> None:
     one, other = (problem.coded.codes for problem in problems)
-    if len(one) != len(other):
-        raise RatingsError(
-            f"design: dependent ratings need the same items, got {len(one)} and "
-            f"{len(other)}"
-        )
+    needed = f"the same items, got {len(one)} and {len(other)}"
+    refuse(
+        (len(one) != len(other), f"design: dependent ratings need {needed}"),
+        error=RatingsError,
+    )
     is_in_one = (one >= 0).any(axis=1) != (other >= 0).any(axis=1)
     if clusters is None and is_in_one.any():
         raise RatingsError(
@@ -336,9 +338,7 @@ def _check_same_items(problems: Sequence[IntervalProblem], clusters: object) -> 
         )
 
 
-def _check_other_clusters(clusters: object) -> None:
-    if clusters is None:
-        return
+def _checked_pair(clusters: object) -> Sequence[object]:
     if not isinstance(clusters, Sequence) or len(clusters) != 2:
         raise ParameterError(
             "clusters: independent ratings need a pair of sequences, one label an item"
@@ -348,6 +348,7 @@ def _check_other_clusters(clusters: object) -> None:
             "clusters: independent ratings need other clusters, got "
             f"{min(map(str, shared))!r} in both"
         )
+    return clusters
 
 
 def _without_units(
@@ -358,9 +359,8 @@ def _without_units(
     Only units that matter are left out, each of all sets at once: (n_sets, n_units);
     and how many of these have a pair of ratings, of the set that has the fewest.
     """
-    units = np.arange(len(problems[0].coded.codes))
-    if clusters is not None:
-        units = cluster_codes(problems[0], clusters)
+    each = np.arange(len(problems[0].coded.codes))
+    units = each if clusters is None else cluster_codes(problems[0], clusters)
     sums, known, n_paired = zip(
         *(cluster_sums(problem, units) for problem in problems), strict=True
     )
@@ -443,15 +443,15 @@ class Differences:
 
     def __str__(self) -> str:
         first = self.estimates[0].coefficient
-        lines = [f"{first}: {self.n_units} {self.unit}, {self.method}"]
-        for one, other in itertools.combinations(range(len(self.names)), 2):
-            lines.append(
-                f"{self.names[one]} - {self.names[other]}: "
-                f"{self.values[one, other]:.3f} "
-                f"[{self.low[one, other]:.3f}, {self.high[one, other]:.3f}], "
-                f"p = {self.p_values[one, other]:.3g}"
-            )
-        return "\n".join([*lines, str(self.equality)])
+        pairs = itertools.combinations(range(len(self.names)), 2)
+        lines = (
+            f"{self.names[one]} - {self.names[other]}: {self.values[one, other]:.3f} "
+            f"[{self.low[one, other]:.3f}, {self.high[one, other]:.3f}], "
+            f"p = {self.p_values[one, other]:.3g}"
+            for one, other in pairs
+        )
+        head = f"{first}: {self.n_units} {self.unit}, {self.method}"
+        return "\n".join([head, *lines, str(self.equality)])
 
 
 def differences(
@@ -546,8 +546,7 @@ def differences(
         raise ParameterError(f"sets: needs ratings of two sets or more, got {sets!r}")
     named = dict(sets) if isinstance(sets, Mapping) else dict(enumerate(sets))
     names = tuple(map(str, named))
-    if len(names) < 2:
-        raise ParameterError(f"sets: needs two or more, got {len(names)}")
+    refuse((len(names) < 2, f"sets: needs two or more, got {len(names)}"))
     problems = [
         pose_problem(
             coefficient,
@@ -561,12 +560,14 @@ def differences(
         for ratings in named.values()
     ]
     n_items = [len(problem.coded.codes) for problem in problems]
-    for name, n in zip(names, n_items, strict=True):
-        if n != n_items[0]:
-            raise RatingsError(
-                f"sets: need the same items, got {n_items[0]} in {names[0]!r} and {n} "
-                f"in {name!r}"
-            )
+    first = f"sets: need the same items, got {n_items[0]} in {names[0]!r}"
+    refuse(
+        *(
+            (n != n_items[0], f"{first} and {n} in {name!r}")
+            for name, n in zip(names, n_items, strict=True)
+        ),
+        error=RatingsError,
+    )
     without, n_units = _without_units(problems, clusters)
     covariance = _covariance(without, n_units)
     # it is given below
@@ -597,11 +598,9 @@ def differences(
         )
     half = np.where(errors > 0.0, quantile * errors, math.nan)
     alone = np.sqrt(np.diag(covariance))
-    with np.errstate(invalid="ignore"):
-        correlation = covariance / np.outer(alone, alone)
     arrays = {
         "standard_errors": alone,
-        "correlation": correlation,
+        "correlation": divide(covariance, np.outer(alone, alone)),
         "values": values,
         "errors": errors,
         "low": values - half,
@@ -806,11 +805,9 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
         _tested, "equality_test", _SAME, "chi-squared", (len(checked) - 1.0,), n_items
     )
     for place, e in enumerate(checked):
-        if e.reason is not None:
-            return test(reason=f"estimate {place}: {e.reason}")
-        if not e.standard_error > 0.0:
-            reason = f"estimate {place}: its standard error is {e.standard_error:g}"
-            return test(reason=reason)
+        if e.reason is not None or not e.standard_error > 0.0:
+            reason = e.reason or f"its standard error is {e.standard_error:g}"
+            return test(reason=f"estimate {place}: {reason}")
     values = np.array([e.value for e in checked])
     precision = np.array([e.standard_error for e in checked]) ** -2.0
     away = values - precision @ values / precision.sum()
@@ -875,8 +872,7 @@ def donner_test(
             f"groups: needs the ratings of two groups or more, got {groups!r}"
         )
     tables = [_concordance(ratings, k, categories) for k, ratings in enumerate(groups)]
-    if len(tables) < 2:
-        raise ParameterError(f"groups: needs two or more, got {len(tables)}")
+    refuse((len(tables) < 2, f"groups: needs two or more, got {len(tables)}"))
     observed = np.array(tables, dtype=np.float64)  # (n_groups, 3): both, one, neither
     n_items = observed.sum(axis=1)
     df, n = (len(tables) - 1.0,), int(n_items.sum())
@@ -911,13 +907,15 @@ def _concordance(
         raise RatingsError(f"groups: group {place}: {error}") from error
     used, freq = counted.n_categories, counted.freq
     rows = item_counts(counted.codes, max(used, 1), counted.repeats)
-    if used == 0:
-        raise RatingsError(f"groups: group {place}: needs a rating, got none")
-    if used > 2 or rows.sum(axis=1).max(initial=0) > 2:
-        raise RatingsError(
+    refuse(
+        (used == 0, f"groups: group {place}: needs a rating, got none"),
+        (
+            used > 2 or rows.sum(axis=1).max(initial=0) > 2,
             f"groups: group {place}: needs two raters and two categories, got "
-            f"{counted.n_raters} and {used}"
-        )
+            f"{counted.n_raters} and {used}",
+        ),
+        error=RatingsError,
+    )
     is_whole = rows.sum(axis=1) == 2
     of_first = np.bincount(rows[is_whole, 0], freq[is_whole], minlength=3)
     both, one, neither = of_first[::-1].astype(int).tolist()

@@ -15,7 +15,7 @@ from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._codes import distinct_rows, item_counts
 from masrel.agreement._engine import Array, Floats, Integers, divide
 from masrel.agreement._weights import MANY
-from masrel.errors import MasrelWarning, ParameterError
+from masrel.errors import MasrelWarning
 from masrel.estimates import Estimate
 from masrel.intervals._question import (
     IntervalProblem,
@@ -282,18 +282,12 @@ def diagnose(
 def _names(
     ratings: object, raters: Sequence[str] | None, n_raters: int
 ) -> tuple[str, ...]:
-    if raters is not None and (
-        isinstance(raters, str) or not isinstance(raters, Iterable)
-    ):
-        raise ParameterError(f"raters: needs a name for each, got {raters!r}")
-    columns = raters if raters is not None else getattr(ratings, "columns", None)
+    are_names = isinstance(raters, Iterable) and not isinstance(raters, str)
+    needed, columns = "raters: needs a name for each", getattr(ratings, "columns", None)
+    refuse((raters is not None and not are_names, f"{needed}, got {raters!r}"))
+    columns = columns if raters is None else raters
     names = tuple(map(str, range(n_raters) if columns is None else columns))
-    refuse(
-        (
-            len(names) != n_raters,
-            f"raters: needs a name for each of {n_raters}, got {len(names)}",
-        )
-    )
+    refuse((len(names) != n_raters, f"{needed} of {n_raters}, got {len(names)}"))
     return names
 
 
@@ -302,10 +296,8 @@ def _place(reference: str | int, names: Sequence[str]) -> int:
     places: dict[object, int] = dict(zip(names, range(len(names)), strict=True))
     if isinstance(reference, int | np.integer) and not isinstance(reference, bool):
         places = {place: place for place in range(len(names))}
-    if reference not in places:
-        raise ParameterError(
-            f"reference: needs one of {', '.join(names)}, got {reference!r}"
-        )
+    needed = f"needs one of {', '.join(names)}, got {reference!r}"
+    refuse((reference not in places, f"reference: {needed}"))
     return places[reference]
 
 
@@ -340,9 +332,8 @@ def _of_pairs(
     pairs = np.fmax(pairs, pairs.transpose(0, 2, 1))
     among = pairs[:, others][:, :, others]
     defined = ~np.isnan(among[0])
-    reference = np.full((3, len(others)), math.nan)
-    if right is not None:
-        reference = pairs[:, others, right]
+    none = np.full((3, len(others)), math.nan)
+    reference = none if right is None else pairs[:, others, right]
     return {
         "pair_values": among[0],
         "pair_low": among[1],

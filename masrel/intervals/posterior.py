@@ -2,18 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from masrel._input import check_option, refuse
-from masrel.agreement import Label
+from masrel.agreement import Label, WeightsLike
 from masrel.estimates import Interval, Target
 from masrel.intervals._question import IntervalProblem, Statistic, pose_problem
 
-if TYPE_CHECKING:
-    from masrel.agreement import WeightsLike
-    from masrel.intervals._rho import PriorName
+PriorName = Literal["uniform", "jeffreys"]
+"""Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""
 
 _MIN_DRAWS = 100
 
@@ -53,7 +52,7 @@ def posterior(
     weights: "WeightsLike" = "identity",
     level: float = 0.95,
     model: _Model = "auto",
-    prior: "PriorName" = "uniform",
+    prior: PriorName = "uniform",
     concentration: float | None = None,
     n_draws: int = 10_000,
     rng: np.random.Generator | int | None = None,

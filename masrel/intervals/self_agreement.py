@@ -30,8 +30,8 @@ from masrel.intervals._quadrature import (
     solve_quantile,
     where_it_matters,
 )
-from masrel.intervals._rho import PRIOR_SHAPES, Prior, PriorName
-from masrel.intervals.posterior import Quantity
+from masrel.intervals._rho import PRIOR_SHAPES, Prior
+from masrel.intervals.posterior import PriorName, Quantity
 
 _METHOD = "hierarchical kappa model, exact"
 _MEAN = "kappa, mean of raters"
@@ -255,8 +255,7 @@ class _Posterior:
 
     def quantiles(self, shares: Sequence[float]) -> list[float]:
         """Return quantiles of the mean."""
-        ends: list[float] = expit(self.mean.quantiles(shares)).tolist()
-        return ends
+        return list(map(float, expit(self.mean.quantiles(shares))))
 
     def rater_quantiles(self, rater: int, shares: Sequence[float]) -> list[float]:
         """Return quantiles of one rater's kappa."""
