@@ -224,9 +224,8 @@ _POPULATIONS: dict[Target, str] = {
 
 def _population(interval: Interval) -> str:
     """Return what an interval generalises to."""
-    if interval.unit == "clusters":
-        return "other clusters of items"
-    return _POPULATIONS[interval.target]
+    is_clustered = interval.unit == "clusters"
+    return "other clusters of items" if is_clustered else _POPULATIONS[interval.target]
 
 
 def _estimate_lines(estimate: Estimate) -> _Lines:
@@ -245,11 +244,13 @@ def _estimate_lines(estimate: Estimate) -> _Lines:
 def _interval_lines(interval: Interval) -> _Lines:
     """Return the ends of an interval, what it generalises to, and how it was made."""
     ends = f"{interval.low:.4g} to {interval.high:.4g}"
-    if interval.reason is not None:
-        ends = f"undefined ({interval.reason})"
+    why = f"undefined ({interval.reason})"
     median = [] if interval.median is None else [f"{interval.median:.4g}"]
     return [
-        (f"{100.0 * interval.level:.6g} % {interval.kind} interval", ends),
+        (
+            f"{100.0 * interval.level:.6g} % {interval.kind} interval",
+            ends if interval.reason is None else why,
+        ),
         *(("posterior median", text) for text in median),
         ("generalises to", _population(interval)),
         ("method", interval.method),
@@ -351,10 +352,9 @@ def _plain(value: object) -> object:
     """Return a value of a result as JSON has it."""
     if isinstance(value, Interval | Estimate):
         return as_document(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
     if isinstance(value, str):
         return str(value)  # also of a note that has a brief form
     if isinstance(value, tuple | list):
         return [_plain(part) for part in value]
-    return value
+    is_none = isinstance(value, float) and not math.isfinite(value)
+    return None if is_none else value

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from masrel._input import refuse
-from masrel.errors import ParameterError
 
 __all__ = [
     "MODIFIED_ASHWORTH",
@@ -114,11 +113,9 @@ class Scale:
         ParameterError
             If the scale has no such grade.
         """
-        if grade not in self.grades:
-            raise ParameterError(
-                f"{grade!r} is not a grade of {self.name}: "
-                f"needed one of {', '.join(self.grades)}"
-            )
+        needed = f"needed one of {', '.join(self.grades)}"
+        absent = f"{grade!r} is not a grade of {self.name}: {needed}"
+        refuse((grade not in self.grades, absent))
         return self.grades.index(grade)
 
 
@@ -260,8 +257,9 @@ def published_scale(scale: Scale) -> PublishedScale | None:
     >>> published_scale(Scale(name="pain", grades=("0", "1"))) is None
     True
     """
-    for published in _OF_THE_LITERATURE:
-        known = published.scale
-        if known.name == scale.name and set(scale.grades) <= set(known.grades):
-            return published
-    return None
+    known = (
+        of
+        for of in _OF_THE_LITERATURE
+        if of.scale.name == scale.name and set(scale.grades) <= set(of.scale.grades)
+    )
+    return next(known, None)

@@ -214,10 +214,8 @@ def _range_text(readings: list[Reading]) -> str:
     # how many tables readings leave
     order = sorted(readings, key=lambda r: (r.n_tables or 0, r.status == "at least"))
     first, last = (count_text(r.n_tables, r.status) for r in (order[0], order[-1]))
-    if first == last:
-        return first
-    first = "1" if first == "one table" else first.removesuffix(" tables")
-    return f"{first} to {last}"
+    number = "1" if first == "one table" else first.removesuffix(" tables")
+    return first if first == last else f"{number} to {last}"
 
 
 def consistent_tables(
@@ -410,13 +408,10 @@ def _alone(claim: Claim) -> dict[str, ConsistentTables]:
     # by the first weights: which of the numbers it is that no table gives
     absent: dict[str, None] = dict.fromkeys(_BESIDE)
     bare = _named(replace(claim, **absent), claim.weights()[0], claim.n_items)  # type: ignore[arg-type]
-    parts = {}
+    parts = [bare] * _has_more(claim)
     if claim.agreement is not None and claim.kappa is not None:
-        parts[f"{claim.agreement} % agreement"] = replace(bare, kappa=None)
-        parts[f"κ {claim.kappa}"] = replace(bare, agreement=None)
-    if _has_more(claim):
-        parts[_numbers(claim)] = bare
-    return {name: _answer(part) for name, part in parts.items()}
+        parts[:0] = replace(bare, kappa=None), replace(bare, agreement=None)
+    return {_numbers(part): _answer(part) for part in parts}
 
 
 _Read = Iterator[tuple[Reading, tuple[CellRows, ...]]]  # each with its examples
@@ -503,9 +498,8 @@ def _has_p(claim: Claim, values: dict[str, _Floats], test: str) -> _Flags:
     with np.errstate(divide="ignore", invalid="ignore"):
         above = np.array([1 - _NORMAL.cdf(z) for z in values["kappa"] / values[error]])
     p = above if sides == 1 else 2 * np.minimum(above, 1 - above)
-    if str(claim.p).startswith("<"):
-        return np.asarray(p < float(printed.value))
-    return _near(p, printed)
+    is_bound = str(claim.p).startswith("<")
+    return np.asarray(p < float(printed.value)) if is_bound else _near(p, printed)
 
 
 def _near(values: _Floats, printed: PrintedNumber, end: float = 0.0) -> _Flags:

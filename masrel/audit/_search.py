@@ -65,12 +65,8 @@ def disagreement(weights: str, n_categories: int) -> Integers:
     """Return v of any two categories in whole numbers, (n_categories, n_categories)."""
     codes = np.arange(n_categories)
     steps = abs(codes[:, None] - codes)
-    known: dict[str, Integers] = {
-        "identity": np.minimum(steps, 1),
-        "linear": steps,
-        "quadratic": steps**2,
-    }
-    return known[weights]
+    known = {"identity": np.minimum(steps, 1), "linear": steps, "quadratic": steps**2}
+    return np.asarray(known[weights])
 
 
 class _Search(ABC):

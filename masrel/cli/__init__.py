@@ -68,15 +68,11 @@ GROUPS = {
 _STATISTICS = tuple(GROUPS["Ratings you have"])
 
 
-def _module_of(command: str) -> str:
-    is_of_files = command.partition("_")[0] in _STATISTICS
-    place = "masrel.cli" if is_of_files else "masrel.lab.cli"
-    return f"{place}.{command}"
-
-
 cli = ListedCommands(
     parts=GROUPS,
-    place=_module_of,
+    place=lambda name: (
+        f"masrel{'' if name.partition('_')[0] in _STATISTICS else '.lab'}.cli.{name}"
+    ),
     context_settings={"help_option_names": ["-h", "--help"]},
     add_help_option=False,
     help="\b\nAgreement of any file of ratings, and studies on a simulator of "

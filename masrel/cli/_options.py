@@ -73,12 +73,11 @@ def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
             values = {key: args.pop(key) for key in keys if key in args}
             command(*study, **args, **{name: group(**values)})
 
-        decorated: Command = with_group
         for option in reversed(options):
-            decorated = option(decorated)
-        for param in vars(decorated)["__click_params__"][-len(options) :]:
+            option(with_group)
+        for param in vars(with_group)["__click_params__"][-len(options) :]:
             vars(param)["heading"] = _HEADINGS[name]
-        return decorated
+        return with_group
 
     return decorate
 
@@ -304,6 +303,5 @@ def _duration(seconds: float) -> str:
     # no more exact than an estimate is
     if seconds >= 90.0:
         return f"about {seconds / 60.0:.0f} min"
-    if seconds >= 10.0:
-        return f"about {round(seconds, -1):.0f} s"
-    return f"about {max(seconds, 1.0):.0f} s"
+    shown = round(seconds, -1) if seconds >= 10.0 else max(seconds, 1.0)
+    return f"about {shown:.0f} s"

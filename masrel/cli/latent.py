@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from masrel._input import refuse
 from masrel.cli._options import (
     GroupedHelp,
     OutputOptions,
@@ -18,7 +19,7 @@ from masrel.cli._options import (
 )
 from masrel.cli._paths import InputFile
 from masrel.cli._reading import read_file, reading_options
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.ratings._findings import Reading
 
 if TYPE_CHECKING:
@@ -68,8 +69,7 @@ def latent(
     latent-trait model gives kappa for new raters, each rater's bias and noise, each
     item's severity, and the thresholds between grades. It takes seconds to minutes.
     """
-    if seed < 0:
-        raise ParameterError(f"--seed: needs at least 0, got {seed}")
+    refuse((seed < 0, f"--seed: needs at least 0, got {seed}"))
     ratings = read_file(file, replace(reading, stream=False))
     from masrel.analysis._file_estimates import check_order
 
@@ -123,11 +123,10 @@ def _part(ratings: "RatingsFile", file: Path, session: str | None) -> "RatingsPa
     parts = {str(part.session): part for part in ratings.parts}
     if session is None and len(parts) == 1:
         return ratings.parts[0]
-    if session in parts:
-        return parts[session]
     known = ", ".join(parts)
-    if session is None:
-        raise RatingsError(
-            f"{file}: holds {len(parts)} sessions ({known}); --only chooses one"
-        )
-    raise RatingsError(f"{file}: --only: holds no session {session}, but {known}")
+    needed = f"{file}: holds {len(parts)} sessions ({known}); --only chooses one"
+    absent = f"{file}: --only: holds no session {session}, but {known}"
+    refuse(
+        (session is None, needed), (session not in parts, absent), error=RatingsError
+    )
+    return parts[str(session)]

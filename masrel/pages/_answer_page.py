@@ -103,12 +103,12 @@ def answer_page(
         ]
     blocks = [block for section in sections for block in section.blocks]
     drawn = [block.name for block in blocks if isinstance(block, Drawing)]
-    sections.append(_methods_section(file, questions, answers, drawn, items))
+    how_made = methods(file, questions, answers, drawn, items)
+    sections.append(_methods_section(*how_made))
     _, sentence = result_sentence(answers, items)
     options = {**(reading or {}), **questions.record()}
     listed = ", ".join(f"{name} {of}" for name, of in options.items() if of is not None)
     title = _TITLES.get(questions.command, "Agreement of the raters in")
-    title += f" {Path(file.read['file']).name}"
     how = {"Command": call} if call else {"Options": listed}
     return _page(file, title, sentence, sections, how, items)
 
@@ -121,12 +121,12 @@ def _page(
     inputs: Mapping[str, str],
     items: str = "items",
 ) -> str:
-    stamp = SIMULATED if file.simulated else ""
+    stamp, name = SIMULATED if file.simulated else "", Path(file.read["file"]).name
     # what repeats it: the command or else the options, and what it was made of
-    known = {**inputs, f"SHA-256 of {Path(file.read['file']).name}": file.sha256()}
+    known = {**inputs, f"SHA-256 of {name}": file.sha256()}
     return html_page(
         Document(
-            title=title,
+            title=f"{title} {name}",
             tag=tag_of("simulated" if file.simulated else "foreign"),
             banner=stamp,
             provenance=" ".join(what_was_read(file, items)),
@@ -158,10 +158,8 @@ def _result_section(
         *(Paragraph(text=text, absent=True) for text in notes),
     ]
     # which have an answer of their own
-    if questions.command in _TITLES and questions.judging is None:
-        blocks = [*more, *blocks]
-    else:
-        blocks += more
+    is_first = questions.command in _TITLES and questions.judging is None
+    blocks = [*more, *blocks] if is_first else [*blocks, *more]
     return Section(name="result", title="Result", blocks=tuple(blocks))
 
 
@@ -191,8 +189,7 @@ def _with_interval(table: Table, level: float) -> Table:
         ends, text = (row[low], row[high]), None
         if isinstance(ends[0], float) and isinstance(ends[1], float):
             text = interval_text(ends[0], ends[1], in_units=at in table.in_units)
-        cells.insert(place, text)
-        rows.append(tuple(cells))
+        rows.append((*cells[:place], text, *cells[place:]))
     return replace(table, columns=tuple(columns), rows=tuple(rows))
 
 
@@ -213,11 +210,10 @@ def _picture_sections(
             blocks[:0] = [
                 table for part in parts if (table := _items_table(part)) is not None
             ]
-        if blocks and len(every) > _MOST_PARTS:
-            text = f"Of the first {_MOST_PARTS} of {len(every)} groups."
-            blocks.insert(0, Paragraph(text=text, absent=True))
+        text = f"Of the first {_MOST_PARTS} of {len(every)} groups."
+        some = [Paragraph(text=text, absent=True)] * (len(every) > _MOST_PARTS)
         if blocks:
-            yield Section(name=name, title=title, blocks=tuple(blocks))
+            yield Section(name=name, title=title, blocks=(*some, *blocks))
 
 
 _OF_ITEMS = (
@@ -267,14 +263,8 @@ def _items_table(seen: PartSeen) -> Table | None:
     )
 
 
-def _methods_section(
-    file: RatingsFile,
-    questions: Questions,
-    answers: Sequence[Answer],
-    pictures: Sequence[str],
-    items: str,
-) -> Section:
-    text, keys = methods(file, questions, answers, pictures, items)
+def _methods_section(text: str, keys: Sequence[str]) -> Section:
+    # a paragraph, and the keys of what it cites
     blocks = [Paragraph(text=text) for text in (text, *reference_texts(keys))]
     return Section(name="methods", title="Methods, to paste", blocks=tuple(blocks))
 
@@ -298,16 +288,14 @@ def latent_page(
     )
     table = replace(table, caption="Every quantity of the model", read=())
     blocks = (drawing, _with_interval(table, level))
-    text, keys = latent_methods(file, result)
-    paper = [Paragraph(text=text) for text in (text, *reference_texts(keys))]
     return _page(
         file,
-        f"Latent trait of the ratings in {Path(file.read['file']).name}",
+        "Latent trait of the ratings in",
         f"Two new raters agree with κ {number(kappa.value, 3)} "
         f"({percent(level)} % credible interval {interval_text(low, high)}).",
         [
             Section(name="result", title="Result", blocks=blocks),
-            Section(name="methods", title="Methods, to paste", blocks=tuple(paper)),
+            _methods_section(*latent_methods(file, result)),
         ],
         {"Command": call, "Seed": str(result.seed)},
     )

@@ -225,11 +225,7 @@ def _of_tables(
         used += keys
         judges = dict.fromkeys(of["judge"] for of in rows if "judge" in of)
         named = {"units": units, "tests": joined(tests), "judges": joined([*judges])}
-        row = (
-            {}
-            if not rows
-            else next((of for of in rows if of.get("is_default")), rows[0])
-        )
+        row = next((of for of in rows if of.get("is_default")), next(iter(rows), {}))
         made[text.text.format(cited(keys), **named, row=row)] = None
     yield from made
 
@@ -260,9 +256,7 @@ def _of_coefficients(
 ) -> str:
     names: dict[str, None] = {}
     for row in rows:
-        keys: tuple[str, ...] = ()
-        if (name := row.estimate.coefficient) in COEFFICIENTS:
-            keys = coefficient_references(name, row.estimate.weights)
+        keys = coefficient_references(row.estimate.coefficient, row.estimate.weights)
         used += keys
         names[_in_words(row, metric) + cited(keys)] = None
     return f"Agreement was estimated by {joined(list(names))}." if names else ""

@@ -271,19 +271,19 @@ def _forest_row(row: Row, forest: _Forest, level: float) -> ForestRow:
     start = f"{key}_" if f"{key}_low" in row else ""
     numbers = (row.get(of) for of in (key, f"{start}low", f"{start}high"))
     value, low, high = (math.nan if x is None else x for x in numbers)
-    ends = None
+    ends, text = None, number(value, 3)
     if math.isfinite(low) and math.isfinite(high):
+        text += f" {interval_text(low, high)}"
         ends = Interval(
             low=low, high=high, level=level, kind="confidence", method="",
             target="items",
         )  # fmt: skip
-    text = number(value, 3)
     return ForestRow(
         label=row[forest.label],
         detail=f"p {p_text(row['p_value'])}" if "p_value" in row else "",
         value=value if math.isfinite(value) else None,
         interval=ends,
-        text=text if ends is None else f"{text} {interval_text(low, high)}",
+        text=text,
         has_zero="p_value" in row,
         group=": ".join(filter(None, (row["group"], row["judge"]))),
     )
@@ -325,9 +325,8 @@ def main_picture(answers: Sequence[Answer], questions: Questions) -> Drawn:
 
 def forest_drawing(answers: Sequence[Answer], questions: Questions) -> Drawing | None:
     """Return the estimates and their intervals; None where none is on that axis."""
-    rows = [row for answer in answers for row in answer.estimates]
-    rows = [row for row in rows if not is_in_units(row)]
-    if not rows:
+    every = [row for answer in answers for row in answer.estimates]
+    if not (rows := [row for row in every if not is_in_units(row)]):
         return None
     intervals = (row.estimate.interval for row in rows)
     ends = [of for of in intervals if of is not None and of.reason is None]
@@ -428,13 +427,12 @@ def _categories(seen: PartSeen) -> Drawing | None:
 
 
 def _bland_altman(seen: PartSeen) -> Drawing | None:
-    for answer in seen.answers:
-        if answer.name == "limits_of_agreement":
-            raters, result = dict(answer.figure)[seen.group]
-            break
+    answer = next((a for a in seen.answers if a.name == "limits_of_agreement"), None)
+    if answer is not None:
+        raters, result = dict(answer.figure)[seen.group]
+    elif seen.coded is None or not seen.is_measured or len(seen.raters) != 2:
+        return None
     else:
-        if seen.coded is None or not seen.is_measured or len(seen.raters) != 2:
-            return None
         raters = seen.raters
         result = limits_of_agreement(seen.coded, level=seen.questions.level)
     return seen.drawing(

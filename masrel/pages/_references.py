@@ -30,11 +30,11 @@ _SCALES = {
 
 def coefficient_references(coefficient: str, weights: str) -> tuple[str, ...]:
     """Return the keys of what a coefficient is cited for."""
-    entry = COEFFICIENTS[coefficient]
+    if (entry := COEFFICIENTS.get(coefficient)) is None:  # kappa of a category
+        return ()
     is_alpha = coefficient == "krippendorff_alpha"
     is_of_kappa = entry.weighted and weights != "identity" and not is_alpha
-    keys = entry.references
-    return (*keys, "cohen1968") if is_of_kappa else keys
+    return (*entry.references, "cohen1968") if is_of_kappa else entry.references
 
 
 def interval_references(interval: Interval) -> tuple[str, ...]:

@@ -88,10 +88,9 @@ def draw(
     with house_style():
         drawn = _drawn(content)
         if isinstance(drawn, Picture):
-            drawn = stacked([("", drawn)])
-        elif isinstance(drawn, list):
-            drawn = stacked(drawn)
-        return finished(drawn, stamp=stamp, forms=forms)
+            drawn = [("", drawn)]
+        figure = stacked(drawn) if isinstance(drawn, list) else drawn
+        return finished(figure, stamp=stamp, forms=forms)
 
 
 def _on_axes(content: Drawn, ax: "Axes | None", stamp: str) -> "Axes":

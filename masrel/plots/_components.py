@@ -54,14 +54,12 @@ def components(
 def components_picture(parts: VarianceComponents) -> Picture:
     """Return the variances as shares of their sum, with standard deviations."""
     total = parts.items + parts.raters + parts.residual or math.nan
-    note = "the share of items is ICC(A,1)"
+    negative = " and ".join(parts.negative)
+    note = f"{negative}: less than 0 by mean squares, taken as 0"
     if math.isnan(total):
         note = f"undefined: {parts.reason or 'all ratings are alike'}"
-    elif parts.negative:
-        note = (
-            f"{' and '.join(parts.negative)}: less than 0 by mean squares, taken as 0"
-        )
-
+    elif not negative:
+        note = "the share of items is ICC(A,1)"
     shares = {name: getattr(parts, name) / total for name in _COLOURS}
     texts = [
         f"{number(share, 2)}, SD {number((share * total) ** 0.5, 2, in_units=True)}"

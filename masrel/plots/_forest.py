@@ -171,7 +171,15 @@ def forest_picture(
     def draw(axes: Axes) -> None:
         values = [row.value for row in rows if row.value is not None]
         ends = [row.interval.low for row in rows if row.interval is not None]
-        lowest = [_lowest(ridge) for ridge in ridges if ridge]
+        lowest = [  # where each ridge begins to be seen
+            float(
+                places[: heights.size][heights > _FAINT * _highest(ridge)].min(
+                    initial=1.0
+                )
+            )
+            for ridge in ridges
+            for places, heights in ridge.values()
+        ]
         left = max(min([0.0, *values, *ends, *lowest]), _LEFT) - 0.05
         axes.set_xlim(left, right)
         axes.set_ylim(_draw_rows(axes, rows, ridges) + 0.05, 0.0)
@@ -214,8 +222,7 @@ def _draw_rows(
     axes: Axes, rows: Sequence[ForestRow], ridges: Sequence[_Ridge]
 ) -> float:
     # from the top down, in inches; how far they reach
-    bottom, group = 0.0, ""
-    spans = []
+    bottom, group, spans = 0.0, "", []
     for row, ridge, height in zip(rows, ridges, _heights(rows, ridges), strict=True):
         top, bottom = bottom, bottom + height
         if row.group and row.group != group:
@@ -321,15 +328,6 @@ def _draw_ridge(axes: Axes, ridge: _Ridge, *, base: float, top: float) -> None:
 
 def _highest(ridge: _Ridge) -> float:
     return max(float(heights.max()) for _, heights in ridge.values())
-
-
-def _lowest(ridge: _Ridge) -> float:
-    # where it begins to be seen
-    faint = _FAINT * _highest(ridge)
-    return min(
-        float(places[: heights.size][heights > faint].min(initial=1.0))
-        for places, heights in ridge.values()
-    )
 
 
 def _ridge(interval: Interval | None) -> _Ridge:

@@ -177,13 +177,14 @@ def confusions_pictures(
     tables: Mapping[str, Sequence[Sequence[float]]], grades: Sequence[str]
 ) -> list[tuple[str, Picture]]:
     """Return a table of classes and grades for each rater."""
-    pictures = []
-    for rater, table in tables.items():
-        counts = np.rint(np.nan_to_num(np.array(table))).astype(np.int64)
-        pictures.append(
-            ("", confusion_picture(counts, grades, ("class", rater), False))
-        )
-    return pictures
+    counts = {
+        rater: np.rint(np.nan_to_num(np.array(table))).astype(np.int64)
+        for rater, table in tables.items()
+    }
+    return [
+        ("", confusion_picture(table, grades, ("class", rater), False))
+        for rater, table in counts.items()
+    ]
 
 
 def counts_picture(
@@ -357,15 +358,19 @@ def categories(
     >>> [text.get_text() for text in ax.texts]
     ['0.67 (3 ratings)', '0.67 (3 ratings)']
     """
-    n, ends = (
-        len(diagnosis.categories),
-        (diagnosis.category_low, diagnosis.category_high),
-    )
+    n = len(diagnosis.categories)
     labels = [number(of, None) for of in diagnosis.categories if names is None]
     labels += names or ()
     refuse((len(labels) != n, f"names: needs one for each of {n}, got {len(labels)}"))
-    of = diagnosis.category_values, *ends, diagnosis.category_counts
-    return shown(categories_picture(*of, labels, diagnosis.level), ax)
+    picture = categories_picture(
+        diagnosis.category_values,
+        diagnosis.category_low,
+        diagnosis.category_high,
+        diagnosis.category_counts,
+        labels,
+        diagnosis.level,
+    )
+    return shown(picture, ax)
 
 
 def categories_picture(
@@ -545,24 +550,21 @@ def _grouped(
     # freq (q,): how often each is met -> group of each, (q,); by group, what is written
     # in cells, what a legend says, and colours, (m, 4); numbers stand for long names
     q, n = len(grades), _MAX_SHADES if is_ordered else len(_HUES)
-    group = np.arange(q)
-    if q > n and is_ordered:
-        group = group * n // q
-    elif q > n:
+    group = np.arange(q) * min(q, n) // q
+    if q > n and not is_ordered:
         usual = np.sort(np.argsort(-freq, kind="stable")[: n - 1])
         group[:] = n - 1
         group[usual] = range(n - 1)
     is_short, labels, texts = max(map(len, grades)) <= _MAX_LETTERS, [], []
     for place in range(min(q, n)):
         names = [grades[k] for k in np.flatnonzero(group == place).tolist()]
-        labels.append(
-            "" if len(names) > 1 else names[0] if is_short else f"{place + 1}"
-        )
         if len(names) == 1:
             name = short_name(names[0], _MAX_LEGEND)
+            labels.append(names[0] if is_short else f"{place + 1}")
             texts.append(name if is_short else f"{place + 1} = {name}")
         else:
             together = f"{names[0]} to {names[-1]}" if is_ordered else ""
+            labels.append("")
             texts.append(together or f"other {len(names)} grades")
     shades = np.linspace(0.0, 1.0, len(texts))
     hues = SEQUENTIAL(shades) if is_ordered else _HUES[: len(texts)]

@@ -121,10 +121,8 @@ _MAX_LETTERS = 22  # of a name
 def short_name(name: str, most: int = _MAX_LETTERS) -> str:
     """Return a name that has room at an axis: the middle of a long one goes."""
     # names often differ at their end
-    if len(name) <= most:
-        return name
     half = (most - 1) // 2
-    return f"{name[:half]}…{name[-half:]}"
+    return name if len(name) <= most else f"{name[:half]}…{name[-half:]}"
 
 
 def short_names(names: Sequence[str]) -> list[str]:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
+from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
 from masrel.analysis._file_estimates import AgreementRow, Answer, Explanation, Row
-from masrel.errors import ParameterError
 from masrel.estimates import (
     Estimate,
     Interval,
@@ -26,7 +26,15 @@ from masrel.tables._estimate_words import (
     promise,
     sentence,
 )
-from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, table_of
+from masrel.tables._tables import (
+    POPULATIONS,
+    SIMULATED,
+    Column,
+    Table,
+    capital,
+    percent,
+    table_of,
+)
 
 if TYPE_CHECKING:
     from masrel.plots._drawn_values import Drawn
@@ -266,8 +274,6 @@ _CONVENTIONS = {
     "print them of Cohen's κ.",
 }
 
-_POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
-
 _SOURCES = {
     "landis_koch": "Landis and Koch (1977)",
     "altman": "Altman (1991)",
@@ -331,8 +337,10 @@ def _row_notes(rows: Sequence[Row], by: str, detail: Detail) -> tuple[str, ...]:
         undefined = [f"undefined: {row['reason']}"] if row.get("reason") else []
         for text in row.get("texts", undefined):
             rows_of.setdefault((text, False), []).append(row)
-        for text in _of_detail(row.get("interval_texts") or (), detail):
-            rows_of.setdefault((text, True), []).append(row)
+        for note in row.get("interval_texts") or ():
+            text = getattr(note, "brief", note) if detail == "usual" else note
+            if text and (detail != "brief" or isinstance(note, _Caution)):
+                rows_of.setdefault((text, True), []).append(row)
     n_intervals = sum(row.get("interval_texts") is not None for row in rows)
     texts_of: dict[str, list[str]] = {}
     for (text, is_of_interval), subset in rows_of.items():
@@ -453,18 +461,8 @@ def _cells(
             texts.append(_Caution(why))
         cells |= {key: getattr(interval, key) for key in _OF_INTERVAL}
         cells["interval_texts"] = [*texts, *interval.notes]
-        cells["population"] = _POPULATIONS[interval.target]
+        cells["population"] = POPULATIONS[interval.target]
     return cells
-
-
-def _of_detail(notes: Sequence[str], detail: Detail) -> list[str]:
-    """Return what is told of the notes of an interval."""
-    by_detail: dict[Detail, list[str]] = {
-        "brief": [note for note in notes if isinstance(note, _Caution)],
-        "usual": [getattr(note, "brief", note) for note in notes],
-        "all": [*notes],
-    }
-    return list(filter(None, by_detail[detail]))
 
 
 def word_of(row: AgreementRow, bands: BandScale) -> str | None:
@@ -589,11 +587,13 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
 
     # what is in the units of the ratings is on no axis of agreement
     rows = [row for row in rows if not is_in_units(row)]
-    if not rows:
-        raise ParameterError(
+    refuse(
+        (
+            not rows,
             "--figure: shows coefficients of agreement, got only estimates in the "
-            "units of the ratings"
+            "units of the ratings",
         )
+    )
     intervals = [row.estimate.interval for row in rows if row.estimate.interval]
     targets = {interval.target for interval in intervals}
     # the axis has the population of all, as of an ICC for other items and raters
@@ -604,12 +604,12 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
         # what neither the axis nor the legend says of the interval
         details = []
         if interval := row.estimate.interval:
-            details += ["one-sided"] if interval.is_one_sided else []
-            is_other = interval.target != common
-            details += [f"other {_POPULATIONS[interval.target]}"] if is_other else []
+            details = ["one-sided"] * interval.is_one_sided
+            if interval.target != common:
+                details.append(f"other {POPULATIONS[interval.target]}")
         group = row.group if several else ""
         detail = ", ".join(details)
         drawn.append(forest_row(row.title, row.estimate, detail=detail, group=group))
     if any(interval.reason is None for interval in intervals):
-        label += f"; intervals for other {_POPULATIONS[common]}"
+        label += f"; intervals for other {POPULATIONS[common]}"
     return Drawn(FOREST, (tuple(drawn), label))

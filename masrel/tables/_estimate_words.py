@@ -1,6 +1,7 @@
 """Estimates, intervals and notes in words: what they are, and what they promise."""
 
 import math
+import re
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -35,15 +36,14 @@ def forest_row(
 
     value, interval = estimate.value, estimate.interval
     text = number(value, 3)
+    low, high = (0.0, math.inf) if interval is None else (interval.low, interval.high)
     if interval is not None and not math.isnan(value):
-        text += f" {interval_text(interval.low, interval.high)}"
-    if interval is not None and not math.isfinite(interval.high - interval.low):
-        interval = None
+        text += f" {interval_text(low, high)}"
     return ForestRow(
         label=label,
         detail=detail,
         value=None if math.isnan(value) else value,
-        interval=interval,
+        interval=interval if math.isfinite(high - low) else None,
         text=text,
         # 0 is what chance gives of an ICC and a κ; not of a share, nor of an order
         has_zero=estimate.coefficient not in COEFFICIENTS  # of a category
@@ -80,18 +80,15 @@ def origin(interval: Interval, noun: Noun) -> str:
     """Return in brackets what the ends of an interval came from."""
     if interval.unit is None or interval.units_are is None:
         return ""
-    one = {"items": noun, "raters": "rater", "clusters": f"cluster of {noun}s"}
-    many = {
-        "items": f"{noun}s",
-        "raters": "raters",
-        "both": f"{noun}s and raters",
-        "clusters": f"clusters of {noun}s",
+    one, many = {
+        "items": (f"one {noun}", f"{noun}s"),
+        "raters": ("one rater", "raters"),
+        "both": (f"{noun}s and raters, one", f"{noun}s and raters"),
+        "clusters": (f"one cluster of {noun}s", f"clusters of {noun}s"),
     }[interval.unit]
     if interval.units_are == "drawn":
         return f" (from {many} drawn with replacement)"
-    if interval.unit == "both":
-        return f" (from leaving out {many}, one at a time)"
-    return f" (from leaving out one {one[interval.unit]} at a time)"
+    return f" (from leaving out {one} at a time)"
 
 
 def pair_words(estimate: Estimate) -> str:
@@ -141,5 +138,4 @@ _SHORT_KINDS = {"confidence": "CI", "credible": "credible interval"}
 
 def _apa(value: float) -> str:
     # two decimals, no 0 before the point: none of the coefficients can exceed 1
-    text = number(value, 2)
-    return text.removeprefix("0") if value >= 0.0 else text.replace("−0.", "−.")
+    return re.sub(r"^(−?)0\.", r"\1.", number(value, 2))

@@ -227,17 +227,8 @@ _VERDICTS = {
     "{judge} alone says {naive} %.",
 }
 _IN_PERCENT = (
-    *(
-        "advantage",
-        "agreement",
-        "difference",
-        "value",
-        "naive",
-        "share",
-        "low",
-        "high",
-        "margin",
-    ),
+    *("advantage", "agreement", "difference", "value", "naive", "share"),
+    *("low", "high", "margin"),
 )
 
 
@@ -247,7 +238,7 @@ def _verdicts(answered: Sequence[Answer], items: str) -> Iterator[str]:
         for row in answer.shown or () if answer.name in _VERDICTS else ():
             if not row.get("is_default", True):
                 continue
-            passes = row.get("is_passed")
+            passes, n = row.get("is_passed"), -(-row.get("n_humans", 0) // 2)
             of = {**row, "margin": row.get("epsilon")}
             of |= {"difference": abs(row.get("difference") or 0.0)}
             of |= {
@@ -267,17 +258,14 @@ def _verdicts(answered: Sequence[Answer], items: str) -> Iterator[str]:
                 "may": "may stand for a human"
                 if passes
                 else "is not shown to be able to stand for a human",
-                "n_needed": _needed(-(-row.get("n_humans", 0) // 2), passes=passes),
+                "n_needed": f"{n} {'is' if n == 1 else 'are'} "
+                f"{'enough' if passes else 'needed'}",
                 "no_proof": "" if passes else " That is no proof that it is worse.",
                 "more": "fewer" if (row.get("difference") or 0.0) < 0.0 else "more",
                 "items": items,
                 "ends": ends,
             }
             yield _VERDICTS[answer.name].format(**words)
-
-
-def _needed(n: int, *, passes: bool | None) -> str:
-    return f"{n} {'is' if n == 1 else 'are'} {'enough' if passes else 'needed'}"
 
 
 def judge_sentences(answered: Sequence[Answer], items: str, data: str) -> str:

@@ -25,12 +25,12 @@ _UNLIKELY = 0.01
 
 def latent_table(result: "LatentTrait", *, read: tuple[str, ...], data: str) -> Table:
     """Return the table of every quantity of the model with its interval."""
-    rows = list(_rows(result))
-    if result.other is not None:  # its intervals stand beside those under the first
-        rows = [
-            row | {"other_low": other["low"], "other_high": other["high"]}
-            for row, other in zip(rows, _rows(result.other), strict=True)
-        ]
+    # intervals under the other prior stand beside those under the first
+    beside = result.other or result
+    rows = [
+        row | {"other_low": other["low"], "other_high": other["high"]}
+        for row, other in zip(_rows(result), _rows(beside), strict=True)
+    ]
     return table_of(
         "latent_trait",
         "",

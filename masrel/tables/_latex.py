@@ -109,17 +109,16 @@ def _line(cells: Sequence[str]) -> str:
 
 def latex_text(text: str) -> str:
     # symbols of the model are set as such; all else is escaped
-    text = _LONG_WORD.sub(_breakable, unicodedata.normalize("NFC", text))
+    text = _LONG_WORD.sub(
+        lambda word: word[0].replace("/", f"/{_MAY_BREAK}"),
+        unicodedata.normalize("NFC", text),
+    )
     parts = SYMBOL.split(text)
     shown = [_escape(parts[0])]
     for letters, index, after in zip(*(parts[k::3] for k in (1, 2, 3)), strict=True):
         symbol = _escape(letters).replace("$", " ").strip()
         shown += [rf"${symbol}_{{\mathrm{{{index}}}}}$", _escape(after)]
     return "".join(shown)
-
-
-def _breakable(word: re.Match[str]) -> str:
-    return word[0].replace("/", f"/{_MAY_BREAK}")
 
 
 def _escape(text: str) -> str:

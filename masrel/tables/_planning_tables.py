@@ -9,6 +9,7 @@ from masrel.agreement import coefficient
 from masrel.planning import Plan
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import (
+    POPULATIONS,
     Column,
     Table,
     number,
@@ -17,7 +18,6 @@ from masrel.tables._tables import (
     table_of,
 )
 
-_TARGETS = {"items": "items", "raters": "raters", "both": "items and raters"}
 _REACHES = {True: "yes", False: "no", None: None}
 _EQUAL = 1e-9  # prevalences that differ by less
 _COMPUTED = ("expected_half_width", "expected_low", "expected_high")
@@ -51,8 +51,8 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
     first = plans[0]
     caption = (
         f"What studies can show of {coefficient(first.coefficient).title}, "
-        f"{percent(first.level)} % interval for other {_TARGETS[first.target]}, model: "
-        f"{first.model}"
+        f"{percent(first.level)} % interval for other {POPULATIONS[first.target]}, "
+        f"model: {first.model}"
         if not labels
         else "What the study can show, by line of its plan"
     )
@@ -76,7 +76,7 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
 def _row(plan: Plan) -> dict[str, Any]:
     values = _values(plan)
     return values | {
-        "target": _TARGETS[plan.target],
+        "target": POPULATIONS[plan.target],
         "prevalences": ", ".join(significant(share, 3) for share in plan.prevalences),
         "reaches": _REACHES[plan.reaches_aim],
         "half_width": values["expected_half_width"],
@@ -146,7 +146,7 @@ def planning_sentence(plan: Plan) -> str:
     return (
         f"With {plan.n_items} items and {plan.n_raters} raters, the {sides}"
         f"{percent(plan.level)} % interval of {title}{weights} for other "
-        f"{_TARGETS[plan.target]}{width}{rest}, if the "
+        f"{POPULATIONS[plan.target]}{width}{rest}, if the "
         f"coefficient is {significant(plan.value, 3)} ({_model(plan)}{how})."
     )
 

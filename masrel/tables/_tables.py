@@ -27,6 +27,9 @@ ABSENT = "–"
 UNDEFINED = "undefined"
 """What is shown for ``nan``."""
 
+POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
+"""What an interval is for others of, by its target."""
+
 # What tables and figures of simulated data carry
 SIMULATED = "SIMULATED DATA"
 SIMULATED_DEVICE = "SIMULATED DEVICE"
@@ -112,15 +115,15 @@ def table_of(
         else column
         for column in columns
     ]
-    cells = [[row.get(column.key) for column in shown] for row in rows]
-    cells = [
-        [_joined(c) if isinstance(c, list | tuple) else c for c in row] for row in cells
-    ]
+    cells = ([row.get(column.key) for column in shown] for row in rows)
     return Table(
         name=name,
         caption=caption,
         columns=tuple(shown),
-        rows=tuple(map(tuple, cells)),
+        rows=tuple(
+            tuple(_joined(c) if isinstance(c, list | tuple) else c for c in row)
+            for row in cells
+        ),
         **more,
     )
 
@@ -158,9 +161,8 @@ def significant(value: float, digits: int = 6) -> str:
 
 def fixed_or_significant(value: float, decimals: int) -> str:
     """Return a number with fixed decimals where they show it, else four digits."""
-    if value == 0.0 or 10.0 ** (1 - decimals) <= abs(value) < 1e7:
-        return f"{value:.{decimals}f}"
-    return significant(value, 4)
+    is_fixed = value == 0.0 or 10.0 ** (1 - decimals) <= abs(value) < 1e7
+    return f"{value:.{decimals}f}" if is_fixed else significant(value, 4)
 
 
 def as_entered(value: float) -> str:
@@ -227,14 +229,14 @@ def as_csv(table: Table, *, raw: bool = False) -> str:
     """Return a table as CSV, every digit kept, with its provenance in each row."""
     # raw: whether texts are as they are, also such as a spreadsheet would run
     cell = str if raw else safe_cell
-    places = [(i, c) for i, c in enumerate(table.columns) if c.where != "page"]
+    places = [i for i, c in enumerate(table.columns) if c.where != "page"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*(cell(column.key) for _, column in places), "data"])
+    writer.writerow([*(cell(table.columns[i].key) for i in places), "data"])
     for row in table.rows:
         cells = [
             None if isinstance(c, float) and not math.isfinite(c) else c
-            for c in (row[i] for i, _ in places)
+            for c in (row[i] for i in places)
         ]
         shown = [cell(c) if isinstance(c, str) else c for c in cells]
         writer.writerow([*shown, table.data])  # None is written as nothing
@@ -246,16 +248,18 @@ def as_text(table: Table, *, width: int | None = None) -> str:
     columns, body = page_cells(table)
     head = [column.heading for column in columns]
     lines = aligned([head, *body], [column.align for column in columns], rule=True)
-    read, notes = table.read, table.notes
-    if width is not None:
-        wrapper = textwrap.TextWrapper(
-            width,
-            subsequent_indent="  ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-        read = tuple(line for text in read for line in wrapper.wrap(text))
-        notes = tuple(line for text in notes for line in wrapper.wrap(text))
+    wrapper = textwrap.TextWrapper(
+        width or 0,
+        subsequent_indent="  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    read, notes = (
+        texts
+        if width is None
+        else [line for text in texts for line in wrapper.wrap(text)]
+        for texts in (table.read, table.notes)
+    )
     head, gap = [table.labelled_caption, *read], list[str]()
     if not table.caption:  # what was read stands for it
         head, gap = [f"{head[0]} {read[0]}".strip(), *read[1:], ""], [""]
@@ -293,15 +297,15 @@ def aligned(
         for cells in rows
     ]
     widths = [max(column) for column in zip(*sizes, strict=True)]
-    lines = []
-    for row in zip(rows, sizes, strict=True):
-        padded = [
+    lines = [
+        "  ".join(
             " " * (width - size) + cell
             if align == "right"
             else cell + " " * (width - size)
             for cell, size, width, align in zip(*row, widths, aligns, strict=True)
-        ]
-        lines.append("  ".join(padded).rstrip())
+        ).rstrip()
+        for row in zip(rows, sizes, strict=True)
+    ]
     if rule:
         lines.insert(1, "  ".join("-" * width for width in widths))
     return lines
