@@ -315,12 +315,15 @@ def side_by_side(first: Any, second: Any) -> Any:
         error=RatingsError,
     )
     if hasattr(first, "iloc") and hasattr(second, "iloc"):
-        if not first.index.equals(second.index):
-            raise RatingsError(
+        refuse(
+            (
+                not first.index.equals(second.index),
                 "ratings, other: needs two Series of one index, got two that differ: "
                 "pandas.concat([a, b], axis=1) puts labels together by their index, "
-                "a.to_numpy() and b.to_numpy() by their place"
-            )
+                "a.to_numpy() and b.to_numpy() by their place",
+            ),
+            error=RatingsError,
+        )
         return first.to_frame("first").assign(second=second)
     return list(zip(*columns, strict=True))
 
@@ -459,11 +462,14 @@ def code_pairs(
         _rows_of(table, f"pairs: rater {rater}", f"pairs: rater {rater}, item", 2)
         for rater, table in enumerate(pairs)
     ]
-    if len({len(table) for table in tables}) != 1:
-        raise RatingsError(
+    refuse(
+        (
+            len({len(table) for table in tables}) != 1,
             "pairs: needs at least one rater, and the same items of every rater, got "
-            f"{', '.join(str(len(table)) for table in tables) or 'no'} items"
-        )
+            f"{', '.join(str(len(table)) for table in tables) or 'no'} items",
+        ),
+        error=RatingsError,
+    )
     rows = [
         [grade for pair in of_item for grade in pair]
         for of_item in zip(*tables, strict=True)
@@ -544,11 +550,14 @@ class CountedRatings:
             if self.repeats is None
             else max(int(self.size.max(initial=0)), 2)
         )
-        if n_items * width > _MAX_PLACES:
-            raise CountsError(
+        refuse(
+            (
+                n_items * width > _MAX_PLACES,
                 f"ratings: needs at most {_MAX_PLACES:.0e} to be laid out item by "
-                f"item, got {n_items} items of up to {width}"
-            )
+                f"item, got {n_items} items of up to {width}",
+            ),
+            error=CountsError,
+        )
         if self.repeats is not None:
             codes = np.full((len(codes), width), MISSING, dtype=codes.dtype)
             places = np.arange(width) < self.size[:, None]
@@ -654,11 +663,13 @@ def raters_told_apart(
     if not counted.tells_raters_apart:
         counted = count_ratings(code_ratings(counted))  # or an error
     n_raters, q = counted.codes.shape[1], len(counted.categories)
-    if n_raters * q > _MAX_MARGINS:
-        raise ParameterError(
+    refuse(
+        (
+            n_raters * q > _MAX_MARGINS,
             f"ratings: {n_raters} raters and {q} different grades are too many to "
-            "count how often each rater gave each grade, which this statistic needs"
+            "count how often each rater gave each grade, which this statistic needs",
         )
+    )
     if counted.n_raters in (0, 1, counted.codes.shape[1]):  # unless two others are left
         return counted
     return counted.chosen(raters=np.asarray((counted.codes >= 0).any(axis=0)))
@@ -683,13 +694,17 @@ def complete_rows(ratings: CountedRatings) -> CountedRatings:
 def refuse_measurements(ratings: CodedRatings | CountedRatings) -> None:
     """Refuse numbers of which hardly any two are alike, where only alike ones agree."""
     n_known, n_ratings = len(ratings.categories), int((ratings.codes >= 0).sum())
-    if n_known > _MEASURED * n_ratings and not isinstance(ratings.categories[0], str):
-        raise RatingsError(
+    refuse(
+        (
+            n_known > _MEASURED * n_ratings
+            and not isinstance(ratings.categories[0], str),
             f"ratings: {n_known} different numbers among {n_ratings} ratings are "
             "measurements, which hardly ever agree without weights: an intraclass "
             "correlation, such as icc_a1, takes them as they are, and so do "
-            "Krippendorff's alpha with the metric interval and quadratic weights"
-        )
+            "Krippendorff's alpha with the metric interval and quadratic weights",
+        ),
+        error=RatingsError,
+    )
 
 
 # -- counts and tables -----------------------------------------------------------------
@@ -700,11 +715,13 @@ def pair_table(
 ) -> Integers:
     """Count the pairs of two columns of codes."""
     # codes (n_items, 2) -> (n_categories, n_categories)
-    if n_categories > _MAX_SIDE:
-        raise ParameterError(
+    refuse(
+        (
+            n_categories > _MAX_SIDE,
             f"ratings: {n_categories} different grades are too many for a table of "
-            "their pairs, which this statistic needs"
+            "their pairs, which this statistic needs",
         )
+    )
     side = n_categories + 1
     # Missing, -1, becomes the last row and column, which is cut off.
     flat = codes[:, 0].astype(np.int32) * side + codes[:, 1] + side + 1
@@ -822,13 +839,18 @@ def check_counts(counts: ArrayLike) -> Integers:
         table = np.asarray(counts)
     except ValueError as error:
         raise CountsError("counts: needs rows of the same length") from error
-    if table.ndim != 2 or 0 in table.shape:
-        raise CountsError(
+    refuse(
+        (
+            table.ndim != 2 or 0 in table.shape,
             "counts: needs a table (items, categories) of at least one of each, "
-            f"got shape {table.shape}"
-        )
-    if table.dtype.kind not in "iuf":
-        raise CountsError(f"counts: needs whole numbers, got {table.dtype}")
+            f"got shape {table.shape}",
+        ),
+        (
+            table.dtype.kind not in "iuf",
+            f"counts: needs whole numbers, got {table.dtype}",
+        ),
+        error=CountsError,
+    )
     values = table.astype(np.float64)
     wrong = ~((values >= 0) & (values == np.floor(values)) & (values < 2**53))
     if wrong.any():
@@ -852,8 +874,8 @@ def check_table(table: ArrayLike) -> Integers:
 def check_two_by_two(table: ArrayLike) -> list[list[int]]:
     """Check a contingency table of two categories."""
     cells = check_table(table)
-    if cells.shape != (2, 2):
-        raise CountsError(f"table: needs 2 × 2, got {len(cells)} × {len(cells)}")
+    needed = f"table: needs 2 × 2, got {len(cells)} × {len(cells)}"
+    refuse((cells.shape != (2, 2), needed), error=CountsError)
     return [[int(n) for n in row] for row in cells]
 
 
@@ -884,11 +906,14 @@ def rating_values(ratings: Any, categories: Sequence[Label] | None) -> Floats:
     known = coded.categories
     if not known:
         return np.empty((0, coded.codes.shape[1]))
-    if not coded.declared and isinstance(known[0], str):
-        raise RatingsError(
+    refuse(
+        (
+            not coded.declared and isinstance(known[0], str),
             "categories: needs the declared scale in order, because the ratings are "
-            f"text, such as {known[0]!r}"
-        )
+            f"text, such as {known[0]!r}",
+        ),
+        error=RatingsError,
+    )
     # missing, -1, is the last
     values = np.array([*category_values(known), np.nan])[coded.codes]
     if np.isinf(values).any():

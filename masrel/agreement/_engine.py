@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import shown, warn_caller
+from masrel._input import refuse, shown, warn_caller
 from masrel.agreement._codes import CountedRatings, count_ratings, refuse_measurements
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import (
@@ -23,7 +23,7 @@ from masrel.agreement._weights import (
     WeightsLike,
     declared_weights,
 )
-from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Significance
 
 Floats = NDArray[np.float64]
@@ -173,8 +173,14 @@ def estimate(
     if are_many and made.counts_misses:
         refuse_measurements(counted)
     n_items = int(freq @ (size > 0))
-    if population is not None:
-        check_population(population, n_items)
+    is_whole = isinstance(population, int | np.integer)
+    refuse(
+        (
+            not (population is None or (is_whole and population >= max(n_items, 1))),
+            f"population: needs a whole number of at least the {n_items} items rated, "
+            f"got {population!r}",
+        )
+    )
     features = formula.features(codes, v, repeats)
     sums, freq = features.summed(freq)
     n_paired = int(freq @ (size > 1))
@@ -227,17 +233,8 @@ def check_level(level: float, name: str = "level") -> None:
     """Check the level of an interval, or another share that is none or all of it."""
     is_number = isinstance(level, int | float | np.integer | np.floating)
     # a level so near to 1 that its upper quantile is that of 1 has no ends
-    if not (is_number and 0.0 < level < 1.0 and 0.5 + 0.5 * level < 1.0):
-        raise ParameterError(f"{name}: needs (0, 1), got {shown(level)}")
-
-
-def check_population(population: int, n_items: int) -> None:
-    """Check the size of a finite population."""
-    if not isinstance(population, int | np.integer) or population < max(n_items, 1):
-        raise ParameterError(
-            f"population: needs a whole number of at least the {n_items} items rated, "
-            f"got {population!r}"
-        )
+    is_level = is_number and 0.0 < level < 1.0 and 0.5 + 0.5 * level < 1.0
+    refuse((not is_level, f"{name}: needs (0, 1), got {shown(level)}"))
 
 
 def undefined(title: str, reason: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import shown, warn_caller
+from masrel._input import refuse, shown, warn_caller
 from masrel.errors import RatingsError, RatingsWarning
 
 Label = str | int | float
@@ -81,14 +81,19 @@ def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
     """Check a declared scale."""
     declared = categories if is_row(categories) else []
     labels = [plain_label(label, lambda: "categories") for label in declared]
-    if not labels:
-        raise RatingsError(
-            "categories: needs a sequence of at least one label, got "
-            f"{shown(categories)}"
-        )
     known = tuple(label for label in labels if label is not None)
-    if len(known) < len(labels):
-        raise RatingsError("categories: a missing value cannot be a category")
+    refuse(
+        (
+            not labels,
+            "categories: needs a sequence of at least one label, got "
+            f"{shown(categories)}",
+        ),
+        (
+            len(known) < len(labels),
+            "categories: a missing value cannot be a category",
+        ),
+        error=RatingsError,
+    )
     check_kinds(known, "categories")
     if len(set(known)) < len(known):
         repeated = [label for i, label in enumerate(known) if label in known[:i]]

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel._input import shown
+from masrel._input import refuse, shown
 from masrel.agreement._labels import Codes, Label, check_kinds, is_row
 from masrel.errors import ParameterError, RatingsError
 
@@ -277,22 +277,22 @@ def declared_weights(
             v: Any = 1.0 - np.eye(q) if q <= MANY else Distances(q)
             n = len(categories)
             return Weights(name=name, n_categories=n, v=v, counts_misses=True)
-        if name not in get_args(WeightName):
-            raise ParameterError(
-                f"weights: needs one of {', '.join(get_args(WeightName))} or a matrix, "
-                f"got {name!r}"
-            )
+        known = ", ".join(get_args(WeightName))
+        needed = f"weights: needs one of {known} or a matrix, got {name!r}"
+        refuse((name not in get_args(WeightName), needed))
     made = weights if isinstance(weights, Weights) else None
     if made is None or made.name not in _NEED_NO_ORDER:
         _check_order(categories, declared)
     if isinstance(name, str):
         return _named(name, categories)
     if isinstance(weights, Weights):
-        if weights.n_categories != len(categories):
-            raise ParameterError(
+        refuse(
+            (
+                weights.n_categories != len(categories),
                 f"weights: needs those of {len(categories)} categories, got weights "
-                f'"{weights.name}" of {weights.n_categories}'
+                f'"{weights.name}" of {weights.n_categories}',
             )
+        )
         return weights
     v = 1.0 - _checked_matrix(weights, categories)
     return Weights(name="custom", n_categories=len(categories), v=v)
@@ -312,11 +312,13 @@ def _checked_matrix(weights: Any, categories: Sequence[Label]) -> Floats:
         table = np.asarray(weights)
     except ValueError as error:
         raise ParameterError("weights: needs rows of the same length") from error
-    if table.shape != (len(categories),) * 2 or table.dtype.kind not in "iufb":
-        raise ParameterError(
+    refuse(
+        (
+            table.shape != (len(categories),) * 2 or table.dtype.kind not in "iufb",
             f"weights: needs {len(categories)} × {len(categories)} numbers, one per "
-            f"pair of categories, got shape {table.shape} of {table.dtype}"
+            f"pair of categories, got shape {table.shape} of {table.dtype}",
         )
+    )
     is_same = np.eye(len(categories), dtype=bool)
     for needed, is_wrong in (
         ("finite numbers of at most 1", ~np.isfinite(table) | (table > 1)),

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import check_option, shown
+from masrel._input import check_option, refuse, shown
 from masrel.agreement._engine import (
     NO_SPREAD,
     ONE_PAIR,
@@ -176,8 +176,8 @@ def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float
     >>> round(equivalence_p_value(kappa, low=0.1, high=0.7), 4)
     0.0117
     """
-    if not _finite("low", low) < _finite("high", high):
-        raise ParameterError(f"low, high: needs low < high, got {low} and {high}")
+    is_reversed = not _finite("low", low) < _finite("high", high)
+    refuse((is_reversed, f"low, high: needs low < high, got {low} and {high}"))
     above = p_value(estimate, null=low, alternative="greater")
     if math.isnan(above):  # with a warning already
         return math.nan
@@ -187,17 +187,16 @@ def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float
 def _finite(name: str, value: float) -> float:
     """Check a number."""
     is_number = isinstance(value, int | float | np.integer | np.floating)
-    if not is_number or isinstance(value, bool) or not abs(value) < math.inf:
-        raise ParameterError(f"{name}: needs a finite number, got {shown(value)}")
+    is_finite = is_number and not isinstance(value, bool) and abs(value) < math.inf
+    refuse((not is_finite, f"{name}: needs a finite number, got {shown(value)}"))
     return float(value)
 
 
 def _why_untestable(estimate: Estimate) -> str | None:
     """Return why an estimate has no law around it, or None."""
-    if not isinstance(estimate, Estimate):
-        raise ParameterError(
-            f"estimate: needs an Estimate, got {type(estimate).__name__}"
-        )
+    got = type(estimate).__name__
+    is_estimate = isinstance(estimate, Estimate)
+    refuse((not is_estimate, f"estimate: needs an Estimate, got {got}"))
     if math.isnan(estimate.value):
         return estimate.reason or "the estimate itself is undefined"
     if estimate.standard_error == 0.0:
@@ -297,15 +296,12 @@ def _yekutieli_bounds(m: int) -> Floats:
 
 def _checked_p_values(p_values: Sequence[float]) -> tuple[Floats, NDArray[np.intp]]:
     """Return p-values, and the places of those that are known, ascending."""
-    if not is_row(p_values):
-        raise ParameterError(f"p_values: needs a sequence, got {shown(p_values)}")
+    refuse((not is_row(p_values), f"p_values: needs a sequence, got {shown(p_values)}"))
     p_values = list(p_values)
     for place, p in enumerate(p_values):
         is_number = isinstance(p, int | float | np.number)
-        if not (is_number and (math.isnan(p) or 0.0 <= p <= 1.0)):
-            raise ParameterError(
-                f"p_values: place {place}: needs [0, 1], got {shown(p)}"
-            )
+        is_in = is_number and (math.isnan(p) or 0.0 <= p <= 1.0)
+        refuse((not is_in, f"p_values: place {place}: needs [0, 1], got {shown(p)}"))
     checked = np.array(p_values, dtype=float)
     return checked, np.argsort(checked)[: int((~np.isnan(checked)).sum())]
 
@@ -431,8 +427,8 @@ def strength(value: float, *, scale: BandScale = "landis_koch") -> str:
     ('fair', 'moderate')
     """
     check_option("scale", scale, _SCALES)
-    if not isinstance(value, int | float | np.number):
-        raise ParameterError(f"value: needs a number, got {shown(value)}")
+    is_number = isinstance(value, int | float | np.number)
+    refuse((not is_number, f"value: needs a number, got {shown(value)}"))
     if value != value:
         return "undefined"
     steps = _SCALES[scale]

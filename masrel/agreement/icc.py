@@ -15,7 +15,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import check_option
+from masrel._input import check_option, refuse
 from masrel.agreement._codes import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
     NO_SPREAD,
@@ -615,12 +615,15 @@ def _features(
     """Return of every item: 1, its sum squared, the sum of squares, each rating."""
     rated = codes >= 0
     some, none = rated.any(axis=1), np.empty((len(codes), 0))
-    if (some & ~rated.all(axis=1)).any():
-        raise RatingsError(
+    refuse(
+        (
+            (some & ~rated.all(axis=1)).any(),
             "ratings: an ICC with items left out, drawn, or in clusters needs every "
             "rating, and some are missing: leave out the items that not every rater "
-            "rated; without clusters its own interval takes all ratings there are"
-        )
+            "rated; without clusters its own interval takes all ratings there are",
+        ),
+        error=RatingsError,
+    )
     x = np.append(values, 0.0)[codes]  # a rater without any rating adds nothing
     dense = np.vstack([some, x.sum(axis=1) ** 2, (x * x).sum(axis=1), x.T])
     return Features(dense, none.astype(np.int64), none, 0)

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option, shown
+from masrel._input import check_option, refuse, shown
 from masrel.agreement._codes import CountedRatings, count_ratings, item_counts
 from masrel.agreement._engine import (
     WHOLE,
@@ -203,17 +203,19 @@ def krippendorff_alpha(
     0.444
     """
     names = (weights, metric, level_of_measurement)
-    if sum(name is not None for name in names) > 1:
-        raise ParameterError("weights, metric: needs one of them, got both")
+    has_two = sum(name is not None for name in names) > 1
+    refuse((has_two, "weights, metric: needs one of them, got both"))
     counted = count_ratings(ratings, categories)
     if level_of_measurement is not None:
         metric, (n_rows, n_columns) = level_of_measurement, counted.coded.codes.shape
-        if n_rows < n_columns:
-            raise ParameterError(
+        refuse(
+            (
+                n_rows < n_columns,
                 f"level_of_measurement: {n_rows} rows and {n_columns} columns may be "
                 "raters by items, as the krippendorff package takes them: rows are "
-                "items here, so turn the table, or say metric if it is as it should be"
+                "items here, so turn the table, or say metric if it is as it should be",
             )
+        )
     made = weights if metric is None else _metric_weights(metric, counted)
     # items with fewer than two ratings are no part of the sample
     paired = counted.chosen(rows=counted.size > 1)
@@ -250,16 +252,18 @@ def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
 
 def _ratio(categories: Sequence[Label]) -> Floats:
     values = spread_values(categories)
-    if len(values) > MANY:
-        raise ParameterError(
+    refuse(
+        (
+            len(values) > MANY,
             "metric: ratio needs a matrix of every two categories, which is made of at "
-            f"most {MANY}, got {len(values)}; interval needs none"
-        )
-    if sums_to_zero(values):
-        raise ParameterError(
+            f"most {MANY}, got {len(values)}; interval needs none",
+        ),
+        (
+            sums_to_zero(values),
             "metric: ratio needs values of which no two sum to 0, got "
-            f"{', '.join(map(str, values.tolist()))}"
-        )
+            f"{', '.join(map(str, values.tolist()))}",
+        ),
+    )
     return ratio(values)
 
 

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option
+from masrel._input import check_option, refuse
 from masrel.agreement._codes import (
     complete_values,
     rated_part,
@@ -360,11 +360,11 @@ def limits_of_agreement(
     check_level(share, "share")
     check_level(level)
     values = complete_values(side_by_side(ratings, other), categories)
-    if values.shape[1] != 2:
-        raise RatingsError(
-            "limits of agreement: need the ratings of two raters, got "
-            f"{values.shape[1]}: choose two"
-        )
+    needed = "limits of agreement: need the ratings of two raters, got"
+    refuse(
+        (values.shape[1] != 2, f"{needed} {values.shape[1]}: choose two"),
+        error=RatingsError,
+    )
     first, second = values[:, 0], values[:, 1]
     differences, averages = first - second, first + 0.5 * (second - first)
     for array in (differences, averages):

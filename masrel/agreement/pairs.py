@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option
+from masrel._input import check_option, refuse
 from masrel.agreement._codes import (
     code_pairs,
     complete_rows,
@@ -277,8 +277,8 @@ def light_kappa(
     everybody = count_ratings(ratings, categories)
     counted = raters_told_apart(everybody)
     n_raters = counted.codes.shape[1]
-    if n_raters < 2:
-        raise RatingsError(f"Light's kappa needs at least two raters, got {n_raters}")
+    needed = f"Light's kappa needs at least two raters, got {n_raters}"
+    refuse((n_raters < 2, needed), error=RatingsError)
     if deletion == "listwise":
         counted = complete_rows(counted)
     rate = np.flatnonzero((everybody.codes >= 0).any(axis=0))

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from masrel._files import refuse_record
-from masrel.errors import ParameterError
+from masrel._input import refuse
 
 _INPUTS, _OUTPUTS = "masrel.inputs", "masrel.outputs"
 
@@ -48,12 +48,14 @@ class FileInFolder(OutputFile):
         """Return the path, refused before anything is computed for it."""
         path = super().convert(value, param, ctx)
         folder = Path(os.fsdecode(path)).parent
-        if not folder.is_dir():
-            option = "" if param is None else f"{param.opts[0]}: "
-            raise ParameterError(
+        option = "" if param is None else f"{param.opts[0]}: "
+        refuse(
+            (
+                not folder.is_dir(),
                 f"{option}needs a folder that exists, got {os.fsdecode(path)}: there "
-                f"is no folder {folder}"
+                f"is no folder {folder}",
             )
+        )
         return path
 
 
@@ -75,8 +77,12 @@ def _compare(key: str, more: Sequence[Path]) -> None:
     paths: dict[str, list[Path]] = {} if ctx is None else ctx.meta
     paths.setdefault(key, []).extend(more)
     inputs = {path.resolve() for path in paths.get(_INPUTS, ())}
-    for path in paths.get(_OUTPUTS, ()):
-        if path.parent.resolve() / path.name in inputs or path.resolve() in inputs:
-            raise ParameterError(
-                f"{path}: needs another file to write, this one is read"
+    refuse(
+        *(
+            (
+                path.parent.resolve() / path.name in inputs or path.resolve() in inputs,
+                f"{path}: needs another file to write, this one is read",
             )
+            for path in paths.get(_OUTPUTS, ())
+        )
+    )

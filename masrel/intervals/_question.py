@@ -239,11 +239,13 @@ def pose_problem(
     if isinstance(ratings, CountedRatings) and not (
         ratings.knows_raters or entry.tells_raters_apart
     ):
-        if target != "items":
-            raise ParameterError(
+        refuse(
+            (
+                target != "items",
                 "target: counts do not say who rated what, so that an interval "
-                f'generalises to other "items"; got "{target}"'
+                f'generalises to other "items"; got "{target}"',
             )
+        )
         ratings = count_ratings(ratings, categories).coded
     coded = entry.code(ratings, categories)
     fewest, most = entry.n_raters

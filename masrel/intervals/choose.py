@@ -35,10 +35,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option
+from masrel._input import check_option, refuse
 from masrel.agreement import CountedRatings, Label, Metric, WeightsLike
 from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, Integers
-from masrel.errors import ParameterError
 from masrel.estimates import (
     _POPULATIONS,
     Estimate,
@@ -190,14 +189,18 @@ def estimate(
     is_own = (
         entry.has_interval and clusters is None and (rule is not None or by_formula)
     )
-    if is_own and there_is not in (target, "both"):
-        raise ParameterError(
+    refuse(
+        (
+            is_own and there_is not in (target, "both"),
             f"target: the interval of {entry.title} generalises to "
             f'{_POPULATIONS[there_is]}, which is "{there_is}", and it has no other; '
-            f'got "{target}"'
-        )
-    if clusters is not None and method == "posterior":
-        raise ParameterError('clusters: needs a method other than "posterior"')
+            f'got "{target}"',
+        ),
+        (
+            clusters is not None and method == "posterior",
+            'clusters: needs a method other than "posterior"',
+        ),
+    )
     if is_own and entry.takes_interval:
         kind = "F" if rule is None else rule.name
         entry = replace(entry, function=partial(entry.function, interval=kind))

@@ -331,11 +331,14 @@ def _check_same_items(problems: Sequence[IntervalProblem], clusters: object) -> 
         error=RatingsError,
     )
     is_in_one = (one >= 0).any(axis=1) != (other >= 0).any(axis=1)
-    if clusters is None and is_in_one.any():
-        raise RatingsError(
+    refuse(
+        (
+            clusters is None and is_in_one.any(),
             "design: dependent ratings need both for every item, row "
-            f"{int(is_in_one.argmax())} has ratings in one of them only"
-        )
+            f"{int(is_in_one.argmax())} has ratings in one of them only",
+        ),
+        error=RatingsError,
+    )
 
 
 def _checked_pair(clusters: object) -> Sequence[object]:

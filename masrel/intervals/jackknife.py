@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._engine import Floats, Integers
-from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target, Unit
 from masrel.intervals._question import (
     COLUMNS,
@@ -210,11 +210,13 @@ def _without_raters(problem: IntervalProblem) -> Iterator[tuple[Floats, Floats]]
     # Items that not every rater rated may matter once the one is gone who did not.
     width = COLUMNS[problem.entry.shape]
     fewest = 2 if width == 2 else 3
-    if problem.n_raters < fewest:
-        raise ParameterError(
+    refuse(
+        (
+            problem.n_raters < fewest,
             f'target: "{problem.target}" needs at least {fewest} raters, because one '
-            f"is left out; got {problem.n_raters}"
+            f"is left out; got {problem.n_raters}",
         )
+    )
     for first in range(0, problem.codes.shape[1], width):
         left_out = np.s_[first : first + width]
         rows = problem.features(np.delete(problem.codes, left_out, axis=1))

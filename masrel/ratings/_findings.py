@@ -7,7 +7,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, Literal, get_args
 
-from masrel.errors import ParameterError, RatingsError
+from masrel._input import refuse
+from masrel.errors import RatingsError
 
 Repeated = Literal["error", "first", "last", "mean"]
 """What becomes of a second grade of an item by the same rater."""
@@ -163,7 +164,7 @@ class Reading:
         """Refuse what is wrong whatever the file is."""
         mark, is_counted = self.delimiter, self.counts or self.table
         is_long = bool(self.rater or self.grade)
-        for is_wrong, text in (
+        refuse(
             (
                 mark is not None and len(mark) != 1,
                 f"--delimiter: needed auto, one letter, tab or blanks, got {mark!r}",
@@ -259,9 +260,7 @@ class Reading:
                 self.no_item and self.item,
                 "--item, --no-item: needed one of them, got both",
             ),
-        ):
-            if is_wrong:
-                raise ParameterError(text)
+        )
 
 
 class Finding(str):

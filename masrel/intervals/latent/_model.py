@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, ndtr, ndtri
 
+from masrel._input import refuse
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import Codes
-from masrel.errors import ParameterError
 
 _NOISE_UNIT = 0.2  # η of about which logarithms of the noises differ in studies
 _FAR = 1e9  # where the first grade begins and the last ends: times 0 it is 0
@@ -64,16 +64,21 @@ class LatentPrior:
     concentration: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, values in (
-            ("item_share", self.item_share),
-            ("noise_fraction", self.noise_fraction),
-            ("noise_spread", (self.noise_spread,)),
-            ("concentration", (self.concentration,)),
-        ):
-            if not all(0.0 < value < math.inf for value in values):
-                raise ParameterError(
-                    f"prior: {name} needs positive numbers, got {values}"
+        parts = {
+            "item_share": self.item_share,
+            "noise_fraction": self.noise_fraction,
+            "noise_spread": (self.noise_spread,),
+            "concentration": (self.concentration,),
+        }
+        refuse(
+            *(
+                (
+                    not all(0.0 < value < math.inf for value in values),
+                    f"prior: {name} needs positive numbers, got {values}",
                 )
+                for name, values in parts.items()
+            )
+        )
 
     @classmethod
     def other(cls) -> "LatentPrior":

@@ -261,23 +261,27 @@ class _Ratings:
             (coded.n_categories < 2, "categories: the model needs two, got one"),
         )
         rated = coded.codes >= 0
-        if not (rated.sum(axis=1) >= 2).any():
-            raise RatingsError("ratings: the model needs an item rated by two raters")
-        rows = np.flatnonzero(rated.any(axis=1))
-        if rows.size < 2:
-            raise RatingsError(
-                "ratings: the model needs two items to say how far apart they are, got "
-                f"{rows.size}"
-            )
+        rows, columns = (np.flatnonzero(rated.any(axis=axis)) for axis in (1, 0))
         highest = coded.codes.max(axis=1)
         lowest = np.where(rated, coded.codes, highest[:, None]).min(axis=1)
-        if (highest <= lowest).all():
-            raise RatingsError(
+        refuse(
+            (
+                not (rated.sum(axis=1) >= 2).any(),
+                "ratings: the model needs an item rated by two raters",
+            ),
+            (
+                rows.size < 2,
+                "ratings: the model needs two items to say how far apart they are, got "
+                f"{rows.size}",
+            ),
+            (
+                (highest <= lowest).all(),
                 "ratings: no two raters disagree on any item, so that nothing tells "
                 "how small biases and noises are; masrel.intervals.posterior bounds "
-                "kappa here"
-            )
-        columns = np.flatnonzero(rated.any(axis=0))
+                "kappa here",
+            ),
+            error=RatingsError,
+        )
         return cls(
             codes=coded.codes[rows][:, columns],
             categories=coded.categories,
