@@ -230,15 +230,13 @@ def _population(interval: Interval) -> str:
 
 def _estimate_lines(estimate: Estimate) -> _Lines:
     """Return the coefficient and, where there is one, its interval."""
-    name, text = estimate.coefficient, f"undefined ({estimate.reason})"
-    if estimate.weights != "identity":
-        name = f"{name} ({estimate.weights})"
-    if estimate.reason is None:
-        text = f"{estimate.value:.4g}"
-        if not math.isnan(estimate.standard_error):
-            text += f" (SE {estimate.standard_error:.2g})"
-    interval = estimate.interval
-    return [(name, text), *([] if interval is None else _interval_lines(interval))]
+    weights = f" ({estimate.weights})" * (estimate.weights != "identity")
+    has_error = not math.isnan(estimate.standard_error)
+    text = f"{estimate.value:.4g}" + f" (SE {estimate.standard_error:.2g})" * has_error
+    if estimate.reason is not None:
+        text = f"undefined ({estimate.reason})"
+    interval = [] if estimate.interval is None else _interval_lines(estimate.interval)
+    return [(estimate.coefficient + weights, text), *interval]
 
 
 def _interval_lines(interval: Interval) -> _Lines:

@@ -143,13 +143,13 @@ def label_codes(
             for j, label in enumerate(row)
             if label not in position
         )
-        listed = ", ".join(map(repr, known))
-        rule = f"needs one of {listed} or a missing value, got {rows[i][j]!r}"
-        if declared is None:
-            rule = (
-                "needs a label, or None for a missing rating, got ''; it is one where "
-                "categories declare it"
-            )
+        rule = (
+            "needs a label, or None for a missing rating, got ''; it is one where "
+            "categories declare it"
+            if declared is None
+            else f"needs one of {', '.join(map(repr, known))} or a missing value, got "
+            f"{rows[i][j]!r}"
+        )
         raise RatingsError(f"{where(i, j)}: {rule}") from None
     return np.array(codes, dtype=np.min_scalar_type(-len(known) - 1)), known
 

@@ -72,8 +72,7 @@ def _parse_printed(
 ) -> PrintedNumber:
     """Return a printed number between two limits; `where` begins the message."""
     plain = text.strip().replace("−", "-") if isinstance(text, str) else ""
-    if where == "p":  # of which a bound may be printed
-        plain = plain.removeprefix("<")
+    plain = plain.removeprefix("<" * (where == "p"))  # of which a bound may be printed
     decimals = len(plain.partition(".")[2])
     is_number = _NUMBER.fullmatch(plain) is not None
     value = Fraction(plain if is_number else 0)

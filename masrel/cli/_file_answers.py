@@ -54,8 +54,7 @@ def _list_register(
     for entry in COEFFICIENTS.values():
         fewest, most = entry.n_raters
         raters = str(fewest) if most == fewest else f"{fewest} or more"
-        if entry.shape == "pairs":
-            raters += ", each twice (--retest)"
+        raters += ", each twice (--retest)" * (entry.shape == "pairs")
         more = ("any" if entry.weighted else "none", ", ".join(entry.aliases))
         lines.append((entry.name, entry.title, raters, *more))
     click.echo("\n".join(aligned(lines, ["left"] * 5, rule=True)))

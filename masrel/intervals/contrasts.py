@@ -288,12 +288,11 @@ def _compare(
         ]
         parts = [_variance_of(values, n) for (values,), n in of_sets]
         variance, n_units = sum(parts), min(n for _, n in of_sets)
-        df = n_units - 1.0
-        if variance > 0.0:  # Satterthwaite's degrees of freedom
-            df = variance**2 / sum(
-                part**2 / max(n - 1, 1)
-                for part, (_, n) in zip(parts, of_sets, strict=True)
-            )
+        # Satterthwaite's degrees of freedom
+        squares = sum(
+            part**2 / max(n - 1, 1) for part, (_, n) in zip(parts, of_sets, strict=True)
+        )
+        df = variance**2 / squares if variance > 0.0 else n_units - 1.0
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
     unit = "item" if clusters is None else "cluster"
     reason = one.reason or other.reason

@@ -147,9 +147,7 @@ class _LeftOut:
 def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _LeftOut:
     """Leave out items, raters, or both, as the target says, or clusters of items."""
     target: Unit = problem.target if clusters is None else "clusters"
-    units: tuple[Unit, ...] = (target,)
-    if target == "both":
-        units = ("items", "raters")
+    units: tuple[Unit, ...] = ("items", "raters") if target == "both" else (target,)
     variance, df, reason = 0.0, problem.max_df, None
     notes: tuple[str, ...] = ()
     if math.isnan(problem.value):

@@ -233,8 +233,8 @@ def _of_tables(
 def _of_data(file: RatingsFile, items: str) -> str:
     read, grades = file.read, file.scale.grades
     rated = counted(read["n_items"], "item", items)
-    if read.get("clusters"):
-        rated += f" in {counted(read.get('n_clusters', 0), 'cluster')}"
+    in_clusters = f" in {counted(read.get('n_clusters', 0), 'cluster')}"
+    rated += in_clusters * bool(read.get("clusters"))
     order = "ordered grade" if file.is_ordered else "unordered grade"
     how = f"with {counted(len(grades), order)}"
     if len(grades) <= _MOST_LISTED:

@@ -164,8 +164,8 @@ def confusion_picture(
 ) -> Picture:
     """Return a table of two raters' grades, shaded by shares of its rows."""
     label = f"share of the row\nsame grade: {_part(counts, 0)}"
-    if is_ordered and len(grades) > 2:
-        label += f"\nsame or next grade: {_part(counts, -1, 0, 1)}"
+    near = f"\nsame or next grade: {_part(counts, -1, 0, 1)}"
+    label += near * (is_ordered and len(grades) > 2)
     used = np.flatnonzero(counts.sum(axis=0) + counts.sum(axis=1)).tolist()
     if len(grades) > _MAX_SHADES and 0 < len(used) < len(grades):
         counts, grades = counts[np.ix_(used, used)], [grades[k] for k in used]

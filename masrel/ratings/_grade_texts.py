@@ -388,9 +388,8 @@ def _thousands_mark(
                 continue
             is_told &= not has_decimals  # a decimal comma is for the caller to say
         ways = f"--thousands {quoted([mark])} reads it so"
-        if not is_known:
-            ways += f", --decimal {mark} as a decimal mark"
-        return mark, is_told, ways
+        other = f", --decimal {mark} as a decimal mark" * (not is_known)
+        return mark, is_told, ways + other
     return None
 
 

@@ -483,9 +483,8 @@ def rated_twice(
     sheet: Sheet, layout: Layout, rows: Codes, item: str, rater: str
 ) -> RatingsError:
     """Return the error of a rating that is there twice."""
-    guess = ""
-    if layout.kind == "wide":
-        guess = ", --rater and --grade name the columns of one row a rating"
+    is_wide = layout.kind == "wide"
+    guess = ", --rater and --grade name the columns of one row a rating" * is_wide
     guess += ", --no-item says that no column names items" * layout.is_item_guessed
     return sheet.refuse(
         "twice",

@@ -201,11 +201,9 @@ def read_ratings(
     suffix, is_large = path.suffix.lower(), bool(options.stream)
     if options.stream is None and not options.whole and path.is_file():
         is_large = path.stat().st_size >= _LARGE_TEXT or suffix == ".parquet"
-    if is_large:
-        streamed = _streamed(path, options, progress or (lambda *_: None))
-        if streamed is not None:
-            return streamed
-    return _read_cells(_read_sheet(path, options), options)
+    tell = progress or (lambda *_: None)
+    streamed = _streamed(path, options, tell) if is_large else None
+    return streamed or _read_cells(_read_sheet(path, options), options)
 
 
 def _read_cells(sheet: Sheet, options: Reading) -> RatingsFile:
@@ -443,9 +441,7 @@ def _rated(
     once, scale = _one_each(sheet, layout, options, ratings, item, rater, grades.scale)
     parts = []
     for k, of in enumerate(names_of_parts):
-        of_part = once
-        if len(names_of_parts) > 1:
-            of_part = [values[once[0] == k] for values in once]
+        of_part = [values[once[0] == k] for values in once]
         items = Column(of_part[1], item.texts).rows(slice(None))
         raters = Column(of_part[2], rater.texts).rows(slice(None))
         parts.append(
@@ -703,10 +699,9 @@ def _whole_numbers(sheet: Sheet, place: int, kind: str, options: Reading) -> Cod
     # -> (n_rows,)
     column, empty = sheet.columns[place], "" if kind == "frequency" else "0"
     numbers = [count_of(text or empty, options) for text in column.texts]
-    for code, n in enumerate(numbers):
+    for text, n in zip(column.texts, numbers, strict=True):
         if not (n >= 0 and n.is_integer() and n <= _MAX_COUNT):
-            where = sheet.where(int(np.argmax(column.codes == code)))
-            text = column.texts[code]
+            where = sheet.where(int(np.argmax(column.is_text(text))))
             hint = if_thousands(text)
             raise sheet.refuse("count", where, place, kind=kind, text=text, hint=hint)
     return np.array(numbers, dtype=np.int64)[column.codes]

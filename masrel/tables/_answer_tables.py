@@ -537,8 +537,9 @@ def words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
         none = " where there is none" if bounded else ""
         laws.append(f"a normal law around the estimate{none}")
     by = f", by {', or by '.join(laws)}" if laws else ""
-    if any(r.lower_bound is None and r.estimate.standard_error == 0.0 for r in named):
-        by += "; undefined where the SE is 0, which does not mean that it is certain"
+    by += "; undefined where the SE is 0, which does not mean that it is certain" * any(
+        row.lower_bound is None and row.estimate.standard_error == 0.0 for row in named
+    )
     return (
         f"At least: the best word of {_SOURCES[bands]} that the true value reaches "
         f"with 95 % probability{by}; the words are conventions."

@@ -102,12 +102,11 @@ def sentence(estimate: Estimate, *, items: str = "items", word: str = "") -> str
     """Return an estimate of items as a sentence for a paper, in the style of APA."""
     # items: what they are called; word: the one that it earns, and whose it is
     entry = COEFFICIENTS[estimate.coefficient]
-    name = entry.title
-    if entry.weighted and estimate.weights != "identity":
-        name = f"{name} ({estimate.weights} weights)"
+    has_weights = entry.weighted and estimate.weights != "identity"
+    name = entry.title + f" ({estimate.weights} weights)" * has_weights
+    fewer = f" ({estimate.n_items_paired} with {pair_words(estimate)})"
     rated = counted(estimate.n_items, "item", items)
-    if estimate.n_items_paired < estimate.n_items:
-        rated += f" ({estimate.n_items_paired} with {pair_words(estimate)})"
+    rated += fewer * (estimate.n_items_paired < estimate.n_items)
     sizes = (rated, counted(estimate.n_raters, "rater"))
     if estimate.reason is not None:
         return f"{name} is undefined ({estimate.reason}), {', '.join(sizes)}."

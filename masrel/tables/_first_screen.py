@@ -73,9 +73,8 @@ def what_was_read(
     ways = (read["format"], read.get("delimiter"), read.get("encoding"), sheet)
     form = "" if detail == "brief" else f" ({', '.join(filter(None, ways))})"
     names = read["raters"]
-    raters = ", ".join(names[:_SHOWN])
-    if len(names) > _SHOWN:
-        raters += f" and {len(names) - _SHOWN} more"
+    more = f" and {len(names) - _SHOWN} more" * (len(names) > _SHOWN)
+    raters = ", ".join(names[:_SHOWN]) + more
     columns = [repr(name) if name else "the first column" for name in read["item"]]
     clusters, frequency = read.get("clusters"), read.get("frequency")
     in_clusters = f" in {counted(read.get('n_clusters', 0), 'cluster')} by {clusters!r}"
@@ -97,9 +96,11 @@ def what_was_read(
 def _of_grades(file: RatingsFile) -> list[str]:
     read, scale, repeated = file.read, file.scale, file.read["n_repeated"]
     grades = list(read["grades"].items())
-    listed = ", ".join(f"{grade} ×{n}" for grade, n in grades[:_SHOWN])
-    if len(grades) > _SHOWN:
-        listed = f"{len(grades)} from {grades[0][0]} to {grades[-1][0]}"
+    listed = (
+        f"{len(grades)} from {grades[0][0]} to {grades[-1][0]}"
+        if len(grades) > _SHOWN
+        else ", ".join(f"{grade} ×{n}" for grade, n in grades)
+    )
     name = " (Modified Ashworth Scale)" if scale.name == "MAS" else ""
     codes = ", ".join(f"{n} {c or 'empty'}" for c, n in read["missing"].items())
     rows = ", ".join(f"{n} {why}" for why, n in read["dropped"].items())

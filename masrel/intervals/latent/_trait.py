@@ -230,9 +230,8 @@ def latent_trait(
         n_runs=1 + compare,
         seed=seed,
     )
-    other = None
-    if compare:
-        other = _summarize(question, other_prior or LatentPrior.other(), seeds[1], None)
+    against = other_prior or LatentPrior.other()
+    other = _summarize(question, against, seeds[1], None) if compare else None
     return _summarize(question, prior or LatentPrior(), seeds[0], other)
 
 
