@@ -368,14 +368,18 @@ def audit_claim(claim: Claim) -> ClaimAudit:
     >>> audit_claim(claim).sentence
     'no table of 12 items in 3 categories gives κ 0.771, by the one reading tried'
     """
-    readings: list[Reading] = []
-    examples: tuple[CellRows, ...] = ()
     read = _one_by_one if _has_more(claim) else _by_rounding
-    for n_absent, weights in product(range(claim.n_unrated + 1), claim.weights()):
-        for reading, tables in read(_named(claim, weights, claim.n_items - n_absent)):
-            readings.append(reading)
-            examples = examples or tables
-    audit = ClaimAudit(claim=claim, readings=tuple(readings), examples=examples)
+    ways = product(range(claim.n_unrated + 1), claim.weights())
+    readings, tables = zip(
+        *(
+            of_way
+            for n_absent, weights in ways
+            for of_way in read(_named(claim, weights, claim.n_items - n_absent))
+        ),
+        strict=True,
+    )
+    examples = next(filter(None, tables), ())
+    audit = ClaimAudit(claim=claim, readings=readings, examples=examples)
     return (
         audit if audit.is_possible is not False else replace(audit, alone=_alone(claim))
     )
@@ -420,10 +424,10 @@ _Read = Iterator[tuple[Reading, tuple[CellRows, ...]]]  # each with its examples
 def _by_rounding(claim: Claim) -> _Read:
     # one reading where both rules lead to the same
     result = _answer(claim)
-    is_one = len({(r.n_tables, r.status) for r in result.readings}) == 1
-    for reading in result.readings[: 1 if is_one else None]:
-        rounding = claim.rounding if is_one else reading.rounding
-        yield replace(reading, rounding=rounding), result.examples
+    first, *others = result.readings
+    if all((r.n_tables, r.status) == (first.n_tables, first.status) for r in others):
+        first, others = replace(first, rounding=claim.rounding), []
+    yield from ((reading, result.examples) for reading in (first, *others))
 
 
 def _one_by_one(claim: Claim) -> _Read:

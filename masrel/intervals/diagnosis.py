@@ -104,23 +104,26 @@ n_categories)
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        lines = [str(self.estimate), "rater: mean of pairs, all without, change"]
         width = max(map(len, self.raters), default=0)
-        for place, rater in enumerate(self.raters):
-            lines.append(
-                f"{rater:<{width}}  {self.mean_values[place]:6.3f}  "
-                f"{self.without_values[place]:6.3f}  {self.changes[place]:+.3f}"
-                + _ends(self.change_low[place], self.change_high[place])
+        raters = (
+            f"{rater:<{width}}  {self.mean_values[place]:6.3f}  "
+            f"{self.without_values[place]:6.3f}  {self.changes[place]:+.3f}"
+            + _ends(self.change_low[place], self.change_high[place])
+            for place, rater in enumerate(self.raters)
+        )
+        wide = max((len(str(category)) for category in self.categories), default=0)
+        categories = (
+            f"{category!s:<{wide}}  {self.category_counts[place]:6d}  "
+            f"{self.category_values[place]:6.3f}"
+            + _ends(self.category_low[place], self.category_high[place])
+            for place, category in enumerate(self.categories)
+        )
+        return "\n".join(
+            (
+                *(str(self.estimate), "rater: mean of pairs, all without, change"),
+                *(*raters, "category: ratings, agreement on it", *categories),
             )
-        lines.append("category: ratings, agreement on it")
-        width = max((len(str(category)) for category in self.categories), default=0)
-        for place, category in enumerate(self.categories):
-            lines.append(
-                f"{category!s:<{width}}  {self.category_counts[place]:6d}  "
-                f"{self.category_values[place]:6.3f}"
-                + _ends(self.category_low[place], self.category_high[place])
-            )
-        return "\n".join(lines)
+        )
 
 
 def _ends(low: float, high: float) -> str:

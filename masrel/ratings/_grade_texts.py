@@ -493,8 +493,7 @@ def _doubts(
         # numbers that differ beyond the digits of a float
         pairs = pairwise(sorted(freq, key=Decimal))
         near = [(one, other) for one, other in pairs if float(one) == float(other)]
-        for one, other in near[:1]:
-            findings.append(Finding("too near", one=one, other=other))
+        findings += [Finding("too near", one=a, other=b) for a, b in near[:1]]
         # more numbers than a scale has grades, most of which hardly ever come again
         if len(freq) > _MANY_GRADES and 2 * len(freq) > n_ratings:
             findings.append(Finding("measurements", n=len(freq), n_ratings=n_ratings))
