@@ -187,9 +187,8 @@ class Coefficient:
         if self.weighted:
             return self.function(ratings, categories=categories, weights=weights)
         self._refuse_weights(weights)
-        if self.has_interval:
-            return self.function(ratings, categories=categories, level=level)
-        return self.function(ratings, categories=categories)
+        more = {"level": level} if self.has_interval else {}
+        return self.function(ratings, categories=categories, **more)
 
     def by_metric(self, metric: Metric | None) -> "Coefficient":
         """Return the coefficient by one of Krippendorff's metrics; itself for None."""

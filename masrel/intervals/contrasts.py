@@ -650,9 +650,8 @@ def _why_undefined(
 
 
 def _too_few(g: int, n: int) -> str | None:
-    if n >= g:
-        return None
-    return f"{g} coefficients need at least {g} items or clusters, got {n}"
+    needed = f"{g} coefficients need at least {g} items or clusters, got {n}"
+    return None if n >= g else needed
 
 
 def _adjusted(
