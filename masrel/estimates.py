@@ -90,8 +90,35 @@ class Distribution:
     words: str
 
 
+_Lines = list[tuple[str, str]]  # what is shown of a result, by name
+
+
+class _Shown:
+    """A result that is shown as lines of names and texts."""
+
+    __slots__ = ()
+
+    def _lines(self) -> _Lines:
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        # the first line, and the others below it
+        return "\n  ".join(f"{name}: {text}" for name, text in self._lines())
+
+    def _repr_html_(self) -> str:
+        # a table with the names in the first column
+        from html import escape  # loaded only in a notebook
+
+        rows = (
+            f"<tr><th scope='row' style='text-align: left'>{escape(name)}</th>"
+            f"<td style='text-align: left'>{escape(text)}</td></tr>"
+            for name, text in self._lines()
+        )
+        return f"<table>{''.join(rows)}</table>"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Interval:
+class Interval(_Shown):
     """A confidence or credible interval that can be understood alone.
 
     Attributes
@@ -157,15 +184,25 @@ class Interval:
     raters_differ: bool = field(default=False, repr=False)
     prior: str = field(default="", repr=False)
 
-    def __str__(self) -> str:
-        return _as_text(_interval_lines(self))
-
-    def _repr_html_(self) -> str:
-        return _as_html(_interval_lines(self))
+    def _lines(self) -> _Lines:
+        # its ends, what it generalises to, and how it was made
+        ends = f"{self.low:.4g} to {self.high:.4g}"
+        why = f"undefined ({self.reason})"
+        median = [] if self.median is None else [f"{self.median:.4g}"]
+        return [
+            (
+                f"{100.0 * self.level:.6g} % {self.kind} interval",
+                ends if self.reason is None else why,
+            ),
+            *(("posterior median", text) for text in median),
+            ("generalises to", _population(self)),
+            ("method", self.method),
+            *(("note", note) for note in self.notes),
+        ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class Estimate(_Shown):
     """An agreement coefficient with what it was computed from.
 
     Attributes
@@ -206,14 +243,16 @@ class Estimate:
     n_categories: int
     reason: str | None = None
 
-    def __str__(self) -> str:
-        return _as_text(_estimate_lines(self))
+    def _lines(self) -> _Lines:
+        # the coefficient and, where there is one, its interval
+        weights = f" ({self.weights})" * (self.weights != "identity")
+        has_error = not math.isnan(self.standard_error)
+        text = f"{self.value:.4g}" + f" (SE {self.standard_error:.2g})" * has_error
+        if self.reason is not None:
+            text = f"undefined ({self.reason})"
+        interval = [] if self.interval is None else self.interval._lines()
+        return [(self.coefficient + weights, text), *interval]
 
-    def _repr_html_(self) -> str:
-        return _as_html(_estimate_lines(self))
-
-
-_Lines = list[tuple[str, str]]  # what is shown of a result, by name
 
 _POPULATIONS: dict[Target, str] = {
     "items": "other items",
@@ -226,51 +265,6 @@ def _population(interval: Interval) -> str:
     """Return what an interval generalises to."""
     is_clustered = interval.unit == "clusters"
     return "other clusters of items" if is_clustered else _POPULATIONS[interval.target]
-
-
-def _estimate_lines(estimate: Estimate) -> _Lines:
-    """Return the coefficient and, where there is one, its interval."""
-    weights = f" ({estimate.weights})" * (estimate.weights != "identity")
-    has_error = not math.isnan(estimate.standard_error)
-    text = f"{estimate.value:.4g}" + f" (SE {estimate.standard_error:.2g})" * has_error
-    if estimate.reason is not None:
-        text = f"undefined ({estimate.reason})"
-    interval = [] if estimate.interval is None else _interval_lines(estimate.interval)
-    return [(estimate.coefficient + weights, text), *interval]
-
-
-def _interval_lines(interval: Interval) -> _Lines:
-    """Return the ends of an interval, what it generalises to, and how it was made."""
-    ends = f"{interval.low:.4g} to {interval.high:.4g}"
-    why = f"undefined ({interval.reason})"
-    median = [] if interval.median is None else [f"{interval.median:.4g}"]
-    return [
-        (
-            f"{100.0 * interval.level:.6g} % {interval.kind} interval",
-            ends if interval.reason is None else why,
-        ),
-        *(("posterior median", text) for text in median),
-        ("generalises to", _population(interval)),
-        ("method", interval.method),
-        *(("note", note) for note in interval.notes),
-    ]
-
-
-def _as_text(lines: _Lines) -> str:
-    """Return the first line, and the others below it."""
-    return "\n  ".join(f"{name}: {text}" for name, text in lines)
-
-
-def _as_html(lines: _Lines) -> str:
-    """Return the lines as a table with their names in the first column."""
-    from html import escape  # loaded only in a notebook
-
-    rows = (
-        f"<tr><th scope='row' style='text-align: left'>{escape(name)}</th>"
-        f"<td style='text-align: left'>{escape(text)}</td></tr>"
-        for name, text in lines
-    )
-    return f"<table>{''.join(rows)}</table>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

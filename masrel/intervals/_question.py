@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,9 @@ from masrel.estimates import Estimate, Interval, Target, Unit, _CountNote
 
 Statistic = str | Callable[..., Estimate] | Coefficient
 """A coefficient: its name, its public function, or its entry in the register."""
+
+PriorName = Literal["uniform", "jeffreys"]
+"""Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""
 
 HELD = (
     "the ordinal metric, which depends on how often each grade was given, was taken "

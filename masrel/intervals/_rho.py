@@ -39,8 +39,7 @@ from masrel.intervals._quadrature import (
     log_sum_exp,
     where_it_matters,
 )
-from masrel.intervals._question import IntervalProblem
-from masrel.intervals.posterior import PriorName
+from masrel.intervals._question import IntervalProblem, PriorName
 
 PRIOR_SHAPES: dict[str, float] = {"uniform": 1.0, "jeffreys": 0.5}
 """The prior of ρ is Beta(shape, shape)."""

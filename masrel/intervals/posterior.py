@@ -9,10 +9,12 @@ import numpy as np
 from masrel._input import check_option, refuse
 from masrel.agreement import Label, WeightsLike
 from masrel.estimates import Interval, Target
-from masrel.intervals._question import IntervalProblem, Statistic, pose_problem
-
-PriorName = Literal["uniform", "jeffreys"]
-"""Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""
+from masrel.intervals._question import (
+    IntervalProblem,
+    PriorName,
+    Statistic,
+    pose_problem,
+)
 
 _MIN_DRAWS = 100
 

@@ -30,8 +30,9 @@ from masrel.intervals._quadrature import (
     solve_quantile,
     where_it_matters,
 )
+from masrel.intervals._question import PriorName
 from masrel.intervals._rho import PRIOR_SHAPES, Prior
-from masrel.intervals.posterior import PriorName, Quantity
+from masrel.intervals.posterior import Quantity
 
 _METHOD = "hierarchical kappa model, exact"
 _MEAN = "kappa, mean of raters"

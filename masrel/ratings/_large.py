@@ -330,9 +330,9 @@ def _refuse_names(answer: Answer, groups: Sheet, places: list[int]) -> None:
             f"{_NAME.format(_cell(place))} = {_quoted(name)}"
             for place, name in enumerate(groups.header)
         )
-        found = answer(f"SELECT min(n) AS n FROM cells WHERE {is_name}")["n"]
-        if not np.ma.is_masked(found):
-            raise groups.refuse("names again", groups.at(int(found[0]) + 1))
+        first = answer(f"SELECT min(n) AS n FROM cells WHERE {is_name}")["n"]
+        if not np.ma.is_masked(first):
+            raise groups.refuse("names again", groups.at(int(first[0]) + 1))
 
 
 def patterns(

@@ -201,8 +201,8 @@ def read_ratings(
     suffix, is_large = path.suffix.lower(), bool(options.stream)
     if options.stream is None and not options.whole and path.is_file():
         is_large = path.stat().st_size >= _LARGE_TEXT or suffix == ".parquet"
-    tell = progress or (lambda *_: None)
-    streamed = _streamed(path, options, tell) if is_large else None
+    report = progress or (lambda *_: None)
+    streamed = _streamed(path, options, report) if is_large else None
     return streamed or _read_cells(_read_sheet(path, options), options)
 
 
