@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from masrel.ratings import RatingsFile, RatingsPart
 
 
-_DRAWER = "masrel.plots._latent_scale:latent_picture"
-
-
 @click.command("latent", cls=GroupedHelp)
 @click.argument("file", type=InputFile(path_type=Path))
 @click.option(
@@ -111,7 +108,9 @@ def latent(
         output,
         document=lambda: latent_document(result),
         text=lambda: shown,
-        figure=lambda: Drawn(_DRAWER, (result, grades)),
+        figure=lambda: Drawn(
+            "masrel.plots._latent_scale:latent_picture", (result, grades)
+        ),
         html=lambda: latent_page(ratings, result, shown, call=call_text()),
         stamp=SIMULATED if simulated else "",
         notes=read,

@@ -313,13 +313,10 @@ def _null(problem: IntervalProblem, _estimate: Estimate) -> float:
     return _null_error(problem.item_counts(), problem.n_raters)
 
 
-_RATERS_ALIKE = ("percent_agreement", "fleiss_kappa", "brennan_prediger", "gwet_ac")
-
-_ErrorOf = Callable[[IntervalProblem, Estimate], float]
-
-_ERRORS: dict[str, dict[str, _ErrorOf]] = {
+_ERRORS: dict[str, dict[str, Callable[[IntervalProblem, Estimate], float]]] = {
     "irrcac": {
-        **dict.fromkeys((*_RATERS_ALIKE, "conger_kappa"), _irrcac),
+        **dict.fromkeys(("percent_agreement", "fleiss_kappa"), _irrcac),
+        **dict.fromkeys(("brennan_prediger", "gwet_ac", "conger_kappa"), _irrcac),
         "krippendorff_alpha": _irrcac_of_alpha,
         **dict.fromkeys(("cohen_kappa", "scott_pi"), _over_n),
     },

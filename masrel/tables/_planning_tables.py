@@ -18,10 +18,7 @@ from masrel.tables._tables import (
     table_of,
 )
 
-_REACHES = {True: "yes", False: "no", None: None}
 _EQUAL = 1e-9  # prevalences that differ by less
-_COMPUTED = ("expected_half_width", "expected_low", "expected_high")
-_CHANCES = ("assurance", "power", "coverage")
 
 
 _COLUMNS = (
@@ -78,7 +75,7 @@ def _row(plan: Plan) -> dict[str, Any]:
     return values | {
         "target": POPULATIONS[plan.target],
         "prevalences": ", ".join(significant(share, 3) for share in plan.prevalences),
-        "reaches": _REACHES[plan.reaches_aim],
+        "reaches": {True: "yes", False: "no", None: None}[plan.reaches_aim],
         "half_width": values["expected_half_width"],
         "low": values["expected_low"],
         "high": values["expected_high"],
@@ -221,7 +218,13 @@ def _estimate_lines(plan: Plan, name: str) -> tuple[str, ...]:
 def _toml_values(plan: Plan) -> Iterator[tuple[str, str]]:
     # keys of [[analysis.sample_sizes]]; what is not there is left out
     aims = ("half_width", "lower", "upper", "null")
-    computed = {key: getattr(plan, key) for key in (*_COMPUTED, *_CHANCES)}
+    computed = {
+        key: getattr(plan, key)
+        for key in (
+            *("expected_half_width", "expected_low", "expected_high"),
+            *("assurance", "power", "coverage"),
+        )
+    }
     for key, value in {
         "n_items": plan.n_items,
         "n_raters": plan.n_raters,
