@@ -149,8 +149,15 @@ def code_ratings(
     else:
         codes, known = label_codes(_rows_of(ratings), scale)
         warn_of_texts(known, codes, declared=scale is not None)
-    codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=known, declared=scale is not None)
+    return CodedRatings(
+        codes=read_only(codes), categories=known, declared=scale is not None
+    )
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that nobody can write to any more."""
+    array.setflags(write=False)
+    return array
 
 
 def _on_scale(
@@ -419,8 +426,9 @@ def code_long(
     codes = np.full((len(item_names), len(rater_names)), MISSING, dtype=grades.dtype)
     order = slice(None, None, -1 if repeated == "first" else 1)  # the last one stays
     codes.reshape(-1)[places[order]] = grades[order]
-    codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=known, declared=scale is not None)
+    return CodedRatings(
+        codes=read_only(codes), categories=known, declared=scale is not None
+    )
 
 
 def _named(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
@@ -562,9 +570,7 @@ class CountedRatings:
             codes = np.full((len(codes), width), MISSING, dtype=codes.dtype)
             places = np.arange(width) < self.size[:, None]
             codes[places] = self.codes.ravel().repeat(self.repeats.ravel())
-        codes = np.repeat(codes, self.freq, axis=0)
-        codes.setflags(write=False)
-        return codes
+        return read_only(np.repeat(codes, self.freq, axis=0))
 
     def chosen(
         self, raters: NDArray[np.bool_] | None = None, rows: Any = slice(None)

@@ -14,6 +14,7 @@ from masrel.agreement._codes import (
     complete_values,
     rated_part,
     rating_values,
+    read_only,
     side_by_side,
 )
 from masrel.agreement._engine import (
@@ -366,9 +367,8 @@ def limits_of_agreement(
         error=RatingsError,
     )
     first, second = values[:, 0], values[:, 1]
-    differences, averages = first - second, first + 0.5 * (second - first)
-    for array in (differences, averages):
-        array.setflags(write=False)
+    differences = read_only(first - second)
+    averages = read_only(first + 0.5 * (second - first))
     n, z = len(differences), NormalDist().inv_cdf(0.5 + 0.5 * share)
     mean = sd = math.nan
     reason, widths = None, [math.nan] * 5

@@ -12,6 +12,7 @@ import numpy as np
 
 from masrel._input import check_option, refuse
 from masrel.agreement import Label, Metric, WeightsLike
+from masrel.agreement._codes import read_only
 from masrel.agreement._engine import Floats, Integers
 from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
@@ -210,11 +211,9 @@ def bootstrap(
     notes = (*units.notes, *_notes(resamples, n_distinct, low == high))
     distribution = None
     if kind != "studentized":
-        for array in (resamples.values, resamples.weights):
-            array.flags.writeable = False
         distribution = Distribution(
-            values=resamples.values,
-            weights=resamples.weights,
+            values=read_only(resamples.values),
+            weights=read_only(resamples.weights),
             continuous=False,
             words=words,
         )

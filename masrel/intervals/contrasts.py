@@ -18,7 +18,7 @@ import numpy as np
 
 from masrel._input import check_option, refuse
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
-from masrel.agreement._codes import item_counts
+from masrel.agreement._codes import item_counts, read_only
 from masrel.agreement._engine import Floats, divide, tested, undefined
 from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
@@ -609,12 +609,10 @@ def differences(
         "high": values + half,
         "p_values": p_values,
     }
-    for array in arrays.values():
-        array.setflags(write=False)
     return Differences(
         names=names,
         estimates=estimates,
-        **arrays,
+        **{name: read_only(array) for name, array in arrays.items()},
         level=level,
         method=f"{unit.removesuffix('s')} jackknife, {_METHODS[simultaneous]}",
         quantile=quantile,

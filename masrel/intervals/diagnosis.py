@@ -12,7 +12,7 @@ import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._codes import distinct_rows, item_counts
+from masrel.agreement._codes import distinct_rows, item_counts, read_only
 from masrel.agreement._engine import Array, Floats, Integers, divide
 from masrel.agreement._weights import MANY
 from masrel.errors import MasrelWarning
@@ -269,8 +269,6 @@ def diagnose(
             **_category_arrays(codes[:, others], freq, coded.n_categories, at),
             **_confusions(codes, freq, coded.n_categories, others, right, at),
         }
-    for array in arrays.values():
-        array.setflags(write=False)
     return Diagnosis(
         estimate=estimate,
         raters=tuple(names[place] for place in others),
@@ -278,7 +276,7 @@ def diagnose(
         reference=None if right is None else names[right],
         level=level,
         notes=notes,
-        **arrays,
+        **{name: read_only(array) for name, array in arrays.items()},
     )
 
 

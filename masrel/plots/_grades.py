@@ -7,7 +7,7 @@ tell apart; the grade itself is written wherever there is room.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ from masrel._input import refuse
 from masrel.agreement import CodedRatings, Label, code_ratings, item_disagreement
 from masrel.agreement._codes import item_counts, pair_table
 from masrel.agreement._weights import category_values
-from masrel.intervals.diagnosis import _names, _place
+from masrel.intervals.diagnosis import Diagnosis, _names, _place
 from masrel.plots._cells import (
     LINE,
     cells,
@@ -47,9 +47,6 @@ from masrel.plots._style import (
     shown,
 )
 from masrel.tables._tables import counted, number, percent
-
-if TYPE_CHECKING:
-    from masrel.intervals import Diagnosis
 
 _Floats = NDArray[np.float64]
 _Integers = NDArray[np.signedinteger[Any]]
@@ -323,7 +320,7 @@ def answer_pictures(
 
 
 def categories(
-    diagnosis: "Diagnosis",
+    diagnosis: Diagnosis,
     *,
     names: Sequence[str] | None = None,
     ax: Axes | None = None,

@@ -24,7 +24,7 @@ from masrel.agreement import (
     count_ratings,
     declared_weights,
 )
-from masrel.agreement._codes import count_items, count_table
+from masrel.agreement._codes import count_items, count_table, read_only
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._doubts import (
     doubt_columns,
@@ -547,9 +547,10 @@ def _put_together(
     def laid_out() -> CodedRatings:
         codes = np.full(shape, -1, dtype=np.min_scalar_type(-q - 1))
         codes[items.codes, raters.codes] = grade
-        codes.setflags(write=False)
         return CodedRatings(
-            codes=codes, categories=scale.values, declared=_is_declared(scale)
+            codes=read_only(codes),
+            categories=scale.values,
+            declared=_is_declared(scale),
         )
 
     is_dense = shape[0] * shape[1] <= max(_MAX_DENSE, _MAX_SPARSE * len(grade))
