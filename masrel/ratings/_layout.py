@@ -280,13 +280,11 @@ def _wide(
     places = range(len(sheet.header))
     if not item and not options.no_item:
         others = taken.union(raters)
-        item = () if kind == "table" else _usual(sheet, "item", others)
-        if not item:
-            item = tuple([place for place in places if place not in others][:1])
-            is_guessed = bool(item)
+        usual = () if kind == "table" else _usual(sheet, "item", others)
+        item = usual or tuple([place for place in places if place not in others][:1])
+        is_guessed = bool(item) and not usual and "frequency" not in named
         # patterns of ratings need no names, as items do
         if "frequency" in named:
-            is_guessed = False
             item = tuple(place for place in item if names_rows(sheet, place))
     raters = raters or tuple(k for k in places if k not in taken.union(item))
     if not raters:
