@@ -140,8 +140,8 @@ def outcomes_of(
         studies = codes if freq is None else [codes.repeat(row, axis=0) for row in freq]
         return np.array([_chosen(design, of) for of in studies]).reshape(-1, 3)
     weight = np.ones(codes.shape[:2]) if freq is None else freq.astype(np.float64)
-    found = _raters_left_out if design.leaves_raters_out else _wald
-    return found(design, weight, codes)
+    interval = _raters_left_out if design.leaves_raters_out else _wald
+    return interval(design, weight, codes)
 
 
 @np.errstate(invalid="ignore")  # 0/0 where a study has no coefficient

@@ -534,8 +534,8 @@ _WITHIN = (("samples",), ("results", "results"), ("traces",), ("data",))
 
 def _within(values: list[Any]) -> Iterator[Any]:
     for value in values:
-        found = (reduce(_inner, path, value) for path in _WITHIN)
-        yield from next((of for of in found if isinstance(of, list)), [value])
+        inner = (reduce(_inner, path, value) for path in _WITHIN)
+        yield from next((of for of in inner if isinstance(of, list)), [value])
 
 
 def _inner(value: Any, key: str) -> Any:
