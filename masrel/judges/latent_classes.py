@@ -157,7 +157,6 @@ class _Fits:
     shares: Floats  # (n_starts, n_classes)
     expected: Floats  # ratings, (n_raters, n_grades, n_starts, n_classes)
     log_likelihood: Floats  # (n_starts,)
-    n_steps: int
     move: float  # the largest of a posterior at the last step
 
 
@@ -275,7 +274,6 @@ def _climb(votes: _Votes, posterior: Floats, max_steps: int, settled: float) -> 
         shares=shares,
         expected=expected,
         log_likelihood=votes.freq @ of_pattern,
-        n_steps=n_steps,
         move=move,
     )
 
@@ -360,7 +358,7 @@ def _result(
     shares, posterior = fits.shares[0], fits.posterior[votes.pattern, 0]
     notes += _doubts(votes, posterior, has_none)
     if fits.move > _SETTLED:
-        notes = (f"EM had not settled after {fits.n_steps} steps", *notes)
+        notes = (f"EM had not settled after {_MAX_STEPS} steps", *notes)
     correct = np.diagonal(confusion, axis1=1, axis2=2)
     correct = np.where(shares * len(posterior) < _NO_ITEM, 0.0, correct)
     reason = None
@@ -670,11 +668,12 @@ def effective_number(errors: object, *, level: float = 0.95) -> EffectiveNumber:
     k, n_items = table.shape
     patterns, freq = np.unique(table, axis=1, return_counts=True)
     pairs = np.array(np.triu_indices(k, 1))  # (2, n_pairs)
-    # sums over all items, and without one of each pattern
+    # Pearson's correlation of 0 and 1, of all items and without one of each pattern
     a, b = patterns[pairs]
     parts = np.stack([np.ones_like(a), a, b, a * b])
     sums = (parts @ freq.astype(np.float64))[..., None]
-    every = _correlations(np.concatenate([sums, sums - parts], axis=-1))
+    n, x, y, xy = np.concatenate([sums, sums - parts], axis=-1)
+    every = divide(n * xy - x * y, np.sqrt((n * x - x * x) * (n * y - y * y)))
     is_defined = ~np.isnan(every[:, 0])
     # without an item a pair may have no correlation: the mean is of the others
     there = every[is_defined]
@@ -712,12 +711,6 @@ def effective_number(errors: object, *, level: float = 0.95) -> EffectiveNumber:
         notes=warn_small(fewest, 10, "errors, or right grades, of a judge"),
         reason=reason,
     )
-
-
-def _correlations(sums: Floats) -> Floats:
-    """Return Pearson's correlation from n, Σ x, Σ y, Σ xy of 0 and 1."""
-    n, x, y, xy = sums
-    return divide(n * xy - x * y, np.sqrt((n * x - x * x) * (n * y - y * y)))
 
 
 def _read_errors(errors: Any) -> tuple[list[object], Floats]:

@@ -7,7 +7,7 @@ mean, with an interval for other items like these.
 import math
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,6 @@ from masrel.judges._paired import check_count, check_share
 from masrel.judges.annotators import Grades, _by_item
 
 _Number = Any  # a float, or an array of them
-_MeanMethod = Literal["auto", "z"]
 _RateMethod = Literal["naive", "rogan_gladen", "prediction_powered", "labels_alone"]
 _Assumption = Literal["judge_is_right", "errors_carry_over", "labels_are_random"]
 _RateNote = Literal["few_labels", "whole_range"]
@@ -214,7 +213,7 @@ def prediction_powered_mean(
     unlabelled: ArrayLike,
     *,
     power: float | None = None,
-    method: _MeanMethod = "z",
+    method: Literal["auto", "z"] = "z",
     level: float = 0.95,
 ) -> RateEstimate:
     """Estimate a mean from labels of few items and predictions of all.
@@ -284,7 +283,7 @@ def prediction_powered_mean(
     0.600 (0.306 to 0.859)
     """
     check_level(level)
-    check_option("method", method, get_args(_MeanMethod))
+    check_option("method", method, ("auto", "z"))
     check_share("power", 0.0 if power is None else power)
     y, f = _numbers("labels", labels), _numbers("predictions", predictions)
     pool = _numbers("unlabelled", unlabelled)

@@ -217,27 +217,7 @@ def plan_grid(
         _several(study.value if value is None else value),
         shares if is_rows and study.model != "table" else (shares,),
     )
-    _check_grid(study, [None in several for several in sizes], executor, scheduler)
-    cells = [
-        design_of(replace(study, value=truth, prevalences=share, n_items=n, n_raters=r))
-        for (truth, share), n, r in itertools.product(truths, *sizes)
-    ]
-    planned = map(_planned, cells) if executor is None else _by_dask(cells, scheduler)
-    plans: list[Plan] = []
-    for plan in planned:
-        plans.append(plan)
-        if progress is not None:
-            progress(len(plans), len(cells))
-    return tuple(plans)
-
-
-def _several(values: Any) -> Sequence[Any]:
-    return values if isinstance(values, Sequence) else (values,)
-
-
-def _check_grid(
-    study: Study, is_solved: list[bool], executor: object, scheduler: object
-) -> None:
+    is_solved = [None in several for several in sizes]
     refuse(
         (all(is_solved), "n_items, n_raters: a grid needs one of them, got none"),
         (
@@ -254,6 +234,21 @@ def _check_grid(
         ),
     )
     check_aim(study, is_solved=any(is_solved))
+    cells = [
+        design_of(replace(study, value=truth, prevalences=share, n_items=n, n_raters=r))
+        for (truth, share), n, r in itertools.product(truths, *sizes)
+    ]
+    planned = map(_planned, cells) if executor is None else _by_dask(cells, scheduler)
+    plans: list[Plan] = []
+    for plan in planned:
+        plans.append(plan)
+        if progress is not None:
+            progress(len(plans), len(cells))
+    return tuple(plans)
+
+
+def _several(values: Any) -> Sequence[Any]:
+    return values if isinstance(values, Sequence) else (values,)
 
 
 def _planned(design: Design) -> Plan:
