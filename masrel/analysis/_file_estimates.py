@@ -554,15 +554,14 @@ def estimate_row(
         notes.append(f"no interval: {why}")
         questions = replace(questions, target=None, convention=None)
         estimate = _estimate(entry, ratings, questions, questions.level)
-    bound = None
-    if questions.words and entry.chance_corrected:
-        bound = lower_bound(estimate, partial(_estimate, entry, ratings, questions))
+    has_word = questions.words and entry.chance_corrected
+    at_level = partial(_estimate, entry, ratings, questions)
     return AgreementRow(
         keys=keys,
         title=questions.title(entry),
         estimate=estimate,
         notes=tuple(notes),
-        lower_bound=bound,
+        lower_bound=lower_bound(estimate, at_level) if has_word else None,
         convention=None if entry.has_interval else questions.convention,
     )
 

@@ -317,12 +317,8 @@ def prediction_powered_mean(
         if is_z
         else moments.jackknife_ends(y, f, power, level)
     )
-    reason = None
-    if np.isnan(low):
-        reason = undefined(
-            "the interval of the prediction-powered mean",
-            "all labelled items have the same error",
-        )
+    why = "all labelled items have the same error"
+    title = "the interval of the prediction-powered mean"
     return RateEstimate(
         method="prediction_powered",
         value=float(value + shift),
@@ -335,7 +331,7 @@ def prediction_powered_mean(
         assumption="labels_are_random",
         power=float(used),
         notes=("few_labels",) if n < _ENOUGH["z" if is_z else "numbers"] else (),
-        reason=reason,
+        reason=undefined(title, why) if np.isnan(low) else None,
     )
 
 

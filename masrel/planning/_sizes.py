@@ -393,9 +393,9 @@ class _Search:
         if low <= highest:
             sizes = range(low, high)
             return self._stable(low + bisect_left(sizes, True, key=self._is_met))
-        n = highest
-        if is_items and not self.sized(20).has_rows:
-            n = min(n, 200)  # a study of so many whose ratings are drawn one by one
+        # of fewer, where their ratings are drawn one by one
+        is_slow = is_items and not self.sized(20).has_rows
+        n = min(highest, 200) if is_slow else highest
         best, (name, words) = self.at(n), aim_words(study)
         note = (
             f"{name}: {words} needs more than {highest} {self._name}; the best that "

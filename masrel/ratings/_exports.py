@@ -215,8 +215,7 @@ def read_typed(
         rows, n_above = _workbook(name, suffix, data, options.sheet, facts)
         return _sheet_of_rows(name, sha256, rows, n_above, facts, options)
     elif suffix in _ARROW:
-        arrow = library(name, _ARROW[suffix])
-        read = partial(arrow.read_table, io.BytesIO(data))
+        read = partial(library(name, _ARROW[suffix]).read_table, io.BytesIO(data))
         frame = read_foreign(name, suffix, lambda: table_frame(read()))
     elif suffix in _PYREADSTAT:
         frame = _statistical(name, suffix, data, options.encoding, facts)

@@ -105,8 +105,13 @@ def _prodigy(path: str, task: _Record) -> Iterator[Annotation]:
     else:
         grades = {"answer": regions or answer}
     who = task.get("_session_id") or PurePosixPath(path).name
-    rater = task.get("_annotator_id") or who
-    yield Annotation(task.get("_input_hash"), rater, grades, task.get("text"), why)
+    yield Annotation(
+        task.get("_input_hash"),
+        task.get("_annotator_id") or who,
+        grades,
+        task.get("text"),
+        why,
+    )
 
 
 def _inception(_: str, row: _Record) -> Iterator[Annotation]:
