@@ -6,13 +6,12 @@ far the order decides, and Bradley-Terry strengths.
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, get_args
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.special import expit
 
-from masrel._input import check_option, listed, refuse, shown
+from masrel._input import listed, refuse, shown
 from masrel.agreement import mcnemar
 from masrel.agreement._engine import NO_SPREAD, Floats, check_level, divide, undefined
 from masrel.agreement._rows import Integers, coded, columns_of
@@ -20,8 +19,6 @@ from masrel.errors import RatingsError
 from masrel.estimates import Significance
 from masrel.intervals._question import student_t, warn_small
 from masrel.judges._paired import score_test
-
-_Ties = Literal["half", "left out"]
 
 _FIELDS = ("item", "first", "second", "winner")
 _MAX_STEPS, _SETTLED = 500, 1e-12  # of Newton's method
@@ -197,9 +194,7 @@ class BradleyTerry:
     covariance : ndarray, shape (n_models, n_models)
         Of the strengths, by items, for differences of two.
     n_comparisons, n_ties, n_items : int
-        Verdicts used, ties among all, and items.
-    ties : {"half", "left out"}
-        What became of ties.
+        Verdicts, ties among them, and items.
     level : float
         Nominal level.
     method : str
@@ -218,7 +213,6 @@ class BradleyTerry:
     n_comparisons: int
     n_ties: int
     n_items: int
-    ties: _Ties
     level: float
     method: str
     notes: tuple[str, ...] = ()
@@ -229,7 +223,6 @@ def bradley_terry(
     comparisons: object,
     *,
     tie: str = "tie",
-    ties: _Ties = "half",
     level: float = 0.95,
 ) -> BradleyTerry:
     """Estimate the strengths of models from verdicts on two of them at a time.
@@ -239,9 +232,7 @@ def bradley_terry(
     comparisons : iterable of (item, first, second, winner), or long DataFrame
         One row a verdict, as `position_bias` takes them; any order, any number.
     tie : str, optional
-        What stands for the winner in a tie.
-    ties : {"half", "left out"}, optional
-        Whether a tie is half a win for each, or no verdict.
+        What stands for the winner in a tie, which is half a win for each.
     level : float, optional
         Nominal level.
 
@@ -253,9 +244,9 @@ def bradley_terry(
     Raises
     ------
     RatingsError
-        If they are not such rows, or none is left.
+        If they are not such rows, or there is none.
     ParameterError
-        If an option is invalid.
+        If the level is invalid.
 
     Warns
     -----
@@ -288,16 +279,10 @@ def bradley_terry(
     >>> bradley_terry(rows).strengths.round(3).tolist()
     [0.347, -0.347]
     """
-    check_option("ties", ties, get_args(_Ties))
     check_level(level)
     items, first, second, score, models = _read(comparisons, tie)
-    used = (score != 0) | (ties == "half")
-    refuse(
-        (not used.any(), "ratings: needs verdicts other than ties, got none"),
-        error=RatingsError,
-    )
-    n_ties, k = int((score == 0).sum()), len(models)
-    items, first, second, score = (of[used] for of in (items, first, second, score))
+    k = len(models)
+    refuse((k < 2, "ratings: needs verdicts, got none"), error=RatingsError)
     wins = np.zeros((k, k))  # of the model in the row
     np.add.at(wins, (first, second), 0.5 + 0.5 * score)
     np.add.at(wins, (second, first), 0.5 - 0.5 * score)
@@ -324,9 +309,8 @@ def bradley_terry(
         high=strengths + half,
         covariance=covariance,
         n_comparisons=len(items),
-        n_ties=n_ties,
+        n_ties=int((score == 0).sum()),
         n_items=n_items,
-        ties=ties,
         level=level,
         method=f"variance by items, t({n_items - 1})",
         notes=notes,
