@@ -380,6 +380,18 @@ def test_a_limit_of_the_device_is_refused_beyond_what_is_safe(
     assert (is_refused(last), is_refused(beyond)) == (False, True)
 
 
+def test_a_session_too_small_for_the_plan_is_refused_where_it_is_asked_for(
+    tmp_path: Path,
+) -> None:
+    # one rater for kappa, and none who comes again for the retest
+    assert problems_of(changed("sessions", 0, "raters", to=["R2"]), tmp_path) == [
+        "analysis.estimates[0].sessions: needed a session of at least two raters, "
+        'got one of 1 (id "kappa")',
+        "analysis.estimates[1].sessions: needed two sessions that share a rater, "
+        'got none in both (id "again")',
+    ]
+
+
 @pytest.mark.parametrize(
     ("path", "problem"),
     [

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from masrel.lab.elbow._polynomials import (
     first_above,
     largest,
     product,
+    split_at_roots,
 )
 from masrel.lab.elbow.identification._catches import Catch
 from masrel.lab.elbow.identification._clusters import (
@@ -42,6 +43,15 @@ def with_roots(*roots: float, scale: float = 1.0) -> list[float]:
     for root in roots:
         p = product(p, [-root, 1.0])
     return p
+
+
+@given(roots=places)
+@example(roots=[0.5])  # in the middle to the bit
+@example(roots=[0.2, 0.5, 0.9])
+def test_a_product_is_cut_at_the_roots_of_its_factors(roots: list[float]) -> None:
+    cuts = split_at_roots(with_roots(*roots), 1.0)
+    # five factors a hundredth apart magnify rounding 1e8 times at most
+    assert cuts == pytest.approx([0.0, *sorted(roots), 1.0], abs=1e-7)
 
 
 @given(
