@@ -444,6 +444,16 @@ def test_ids_that_give_two_schedules_one_file_are_refused(
     assert all("a file of its own" in text for text in found)
 
 
+def test_too_many_presentations_for_the_codes_are_refused(tmp_path: Path) -> None:
+    document = changed("schedule", "repeats", to=20)
+    model = document["models"][1]
+    document["models"] += [dict(model, id=f"X{i}") for i in range(24)]
+    assert problems_of(document, tmp_path) == [
+        "schedule.repeats: needed at most 500 presentations a session, "
+        "got 26 models times 20"
+    ]
+
+
 def test_all_problems_come_at_once_types_before_rules(tmp_path: Path) -> None:
     def keys() -> list[str]:
         return sorted(text.split(": ")[0] for text in problems_of(document, tmp_path))
