@@ -1,5 +1,6 @@
 """Rows of a design are allotted by the study's log, and by nothing else."""
 
+import hmac
 import json
 import os
 from pathlib import Path
@@ -103,6 +104,29 @@ def test_nothing_is_allotted_where_the_draw_is_refused(study: StudyPaths) -> Non
         allot_schedules(study, protocol)
     assert not study.conduct_file.exists()
     assert not study.schedules.exists()
+
+
+def test_each_site_has_rows_and_a_secret_of_its_own(study: StudyPaths) -> None:
+    protocol = at_sites()
+    allot_schedules(study, protocol)
+    assert allotted(study) == [
+        ("R1", "test", "north", "williams", 1),
+        ("R2", "test", "south", "williams", 1),
+        ("R3", "test", "north", "williams", 2),
+        ("R4", "test", "south", "williams", 2),
+    ]
+    schedules = [read_schedule(study.schedule_file(r, "test")) for r in RATERS]
+    assert len({schedule.commitment for schedule in schedules}) == 1
+    assert [schedule.site for schedule in schedules] == list(SITES.values())
+    assert broken(study, protocol) == []
+    # derived by hand: the first 16 bytes of an HMAC-SHA256 of the site's id
+    south = hmac.new(SECRET, b'["masrel","site","south"]', "sha256").digest()[:16]
+    plain = protocol_of(raters=RATERS, sites=SITES)
+    sited = protocol_of(raters=RATERS, sites=SITES, strata="site")
+    drawn = draw_schedule(sited, "R2", "test", secret=SECRET)
+    of_site = draw_schedule(plain, "R2", "test", secret=south)
+    assert drawn.presentations == of_site.presentations
+    assert drawn.commitment != of_site.commitment
 
 
 def test_a_rater_who_changes_site_has_no_schedule_until_it_is_drawn_anew(
