@@ -26,11 +26,6 @@ def agreement(name: object, scale: list[float] | list[str]) -> list[list[float]]
     return made.as_floats().tolist()  # type: ignore[no-any-return]
 
 
-def disagreement(name: str, scale: list[object]) -> np.ndarray:
-    """Return v."""
-    return np.asarray(declared_weights(name, scale).v)  # type: ignore[arg-type]
-
-
 # v above the diagonal of UNEVEN: of 1 and 2, of 1 and 4, of 2 and 4
 @pytest.mark.parametrize(
     ("name", "by_hand"),
@@ -52,7 +47,8 @@ def test_weights_of_an_uneven_scale_by_hand(
 ) -> None:
     a, b, c = by_hand
     by_hand = np.array([[0, a, b], [a, 0, c], [b, c, 0]], dtype=float)
-    assert disagreement(name, UNEVEN) == pytest.approx(by_hand, rel=1e-15)
+    found = np.asarray(declared_weights(name, UNEVEN).v)  # type: ignore[arg-type]
+    assert found == pytest.approx(by_hand, rel=1e-15)
 
 
 def test_scale_of_the_declared_order_and_not_of_the_values() -> None:

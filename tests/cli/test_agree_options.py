@@ -93,11 +93,6 @@ def written(folder: Path, text: str, name: str = "ratings.csv") -> Path:
     return path
 
 
-def table(done: Done) -> list[dict[str, str]]:
-    assert done.code == 0, done.err
-    return list(csv.DictReader(io.StringIO(done.out)))
-
-
 def test_warnings_are_lines_on_stderr_alone(masrel: Caller, tmp_path: Path) -> None:
     rows = [f"{k},{20 + 1.37 * k:.2f},{20.5 + 1.31 * k:.2f}\n" for k in range(30)]
     path = written(tmp_path, "item,Kim,Lee\n" + "".join(rows), "r.csv")
@@ -119,7 +114,8 @@ def test_the_command_that_is_offered_gives_an_interval(
     assert words == "no interval; for other items like these"
     assert shlex.split(command) == [*call, "--target", "items"]
     done = masrel(*shlex.split(command))
-    assert all(row["low"] for row in table(done))
+    assert done.code == 0, done.err
+    assert all(row["low"] for row in csv.DictReader(io.StringIO(done.out)))
     assert "no interval" not in done.err
 
 

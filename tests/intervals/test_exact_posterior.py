@@ -116,20 +116,12 @@ WITH_PAIRS = tables().filter(
 )
 
 
-def exact(
-    ratings: Sequence[Sequence[str | None]],
-    categories: Sequence[str] = LABELS,
-    level: float = 0.95,
-) -> Interval:
-    return posterior(
-        "fleiss_kappa", ratings, target="items", categories=categories, level=level
-    )
-
-
 @settings(max_examples=25)
 @given(WITH_PAIRS)
 def test_the_density_integrates_to_one(table: Table) -> None:
-    of = exact(table).distribution
+    of = posterior(
+        "fleiss_kappa", table, target="items", categories=LABELS
+    ).distribution
     assert of is not None
     assert of.continuous
     assert (np.diff(of.values) > 0.0).all()

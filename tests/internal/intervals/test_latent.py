@@ -257,18 +257,14 @@ def misses(values: Floats, law: Callable[[float], float]) -> float:
     )
 
 
-def prior_only(prior: LatentPrior) -> LatentDensity:
-    """Four grades, two items, two raters, and no rating."""
-    return LatentDensity.of(np.full((2, 2), -1), 4, prior)
-
-
 PRIOR = LatentPrior(item_share=(2.0, 2.0), noise_fraction=(2.0, 1.5), concentration=2.0)
 
 
 def test_sampling_without_data_gives_the_prior_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    model = prior_only(PRIOR)
+    # four grades, two items, two raters, and no rating
+    model = LatentDensity.of(np.full((2, 2), -1), 4, PRIOR)
 
     def unknowns(position: Floats) -> dict[str, Floats]:
         traits = model.traits(position.reshape(-1, model.n_dimensions))

@@ -39,11 +39,6 @@ def refused(done: Done, words: str, most: int = 2) -> None:
     assert len(done.err.splitlines()) <= most  # problems, and how many there are
 
 
-def names_model(study: Path, file: str) -> None:
-    entry = f'[[models]]\nid = "F1"\nrole = "dummy"\nfile = "{file}"\n\n[[raters]]'
-    changed(study, r"(?m)^\[\[raters\]\]$", entry)
-
-
 def test_what_is_no_file_is_not_waited_for(
     study: Path, tmp_path: Path, masrel: Caller
 ) -> None:
@@ -63,7 +58,8 @@ def test_what_is_no_file_is_not_waited_for(
     log.parent.mkdir()
     os.mkfifo(log)
     assert masrel("schedule", study).code == 2  # a session seems to have begun
-    names_model(study, "/dev/zero")
+    entry = '[[models]]\nid = "F1"\nrole = "dummy"\nfile = "/dev/zero"\n\n[[raters]]'
+    changed(study, r"(?m)^\[\[raters\]\]$", entry)
     refused(masrel("check", study), "not a regular file", 3)
     (study / "protocol.toml").unlink()
     (study / "protocol.toml").symlink_to(pipe)

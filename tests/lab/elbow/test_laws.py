@@ -1,5 +1,6 @@
 """What every law offers: the paper's law as one of them, and Tardieu's angles."""
 
+from dataclasses import replace
 from math import degrees, radians
 
 import pytest
@@ -10,6 +11,9 @@ from masrel.lab.elbow import (
     STANDARD_MODELS,
     ConstantSpeed,
     ElbowParameters,
+    Joined,
+    MinimumJerk,
+    Reversed,
     tardieu,
 )
 from masrel.lab.elbow.tone import (
@@ -102,3 +106,22 @@ class Foreign:
 def test_what_has_no_such_angles_is_refused(model, options: dict, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         tardieu(model, **options)
+
+
+@pytest.mark.parametrize("name", STANDARD_MODELS)
+@pytest.mark.parametrize("post_catch", ["continuous", "additive"])
+def test_no_stretch_passes_the_largest_torque(name: str, post_catch: str) -> None:
+    model = replace(STANDARD_MODELS[name], post_catch=post_catch)
+    shares = []
+    for deg_s in (25, 60, 92, 131, 200, 300):
+        speed, end = radians(deg_s), model.range_end
+        there = ConstantSpeed(start=START, end=end, speed=speed)
+        gentle = MinimumJerk(start=START, end=end, mean_speed=speed * 8 / 15)
+        slow = ConstantSpeed(start=START, end=end - 0.1, speed=radians(15))
+        late = Joined([slow, ConstantSpeed(start=end - 0.1, end=end, speed=speed)])
+        bound = model.largest_torque(start_angle=START, speed=speed)
+        for stretch in (there, gentle, late):
+            _, torque, _ = stepped(model, Joined([stretch, Reversed(motion=stretch)]))
+            shares.append(float(abs(torque).max()) / bound)
+    assert max(shares) <= 1.0
+    assert max(shares) > 0.8  # a bound that is reached, more or less

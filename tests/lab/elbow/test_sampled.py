@@ -27,6 +27,11 @@ HM3 = STANDARD_MODELS["HM3"]
 PRE_CATCH, CATCH, POST_CATCH = range(len(PHASES))
 
 
+def move(joint: SampledJoint, angle_deg: float, speed_deg_s: float, time: float) -> int:
+    joint.step(time, radians(angle_deg), radians(speed_deg_s))
+    return joint.phase
+
+
 # Against the exact law
 
 
@@ -156,3 +161,45 @@ def test_a_day_of_rest_takes_no_more_points_than_a_second() -> None:
 def test_one_point_is_no_line() -> None:
     with pytest.raises(ParameterError, match="n_points: needs 2 or more, got 1"):
         outline(HM3, constant(92.0), n_points=1)
+
+
+@pytest.mark.parametrize("until", [0.6, 1.05])  # in the catch, in post-catch
+def test_release_returns_to_pre_catch_and_the_stretch_does_not_catch_again(
+    until: float,
+) -> None:
+    joint = SampledJoint(HM3, start_angle=radians(30.0))
+    time = 0.0
+    while time < until:
+        move(joint, 30.0 + 100.0 * time, 100.0, time)
+        time += 0.01
+    assert joint.phase in (CATCH, POST_CATCH)
+    joint.release()
+    assert joint.phase == PRE_CATCH
+    angle, velocity = radians(30.0 + 100.0 * time), radians(100.0)
+    value = joint.step(time, angle, velocity)
+    assert value == 1.26 * velocity + 3.15 * (angle - radians(30.0))
+    for i in range(1, 20):
+        assert move(joint, 30.0 + 100.0 * time + i, 100.0, time + 0.01 * i) == PRE_CATCH
+
+
+def test_flexing_ends_the_stretch_and_arms_the_next() -> None:
+    joint = SampledJoint(HM3, start_angle=radians(30.0))
+
+    def stretch(start: float) -> list[int]:
+        return [move(joint, 30.0 + i, 100.0, start + 0.01 * i) for i in range(1, 110)]
+
+    once = stretch(0.0)
+    assert CATCH in once
+    assert once[-1] == POST_CATCH
+    assert move(joint, 139.0, 0.0, 1.2) == PRE_CATCH  # it stopped
+    # moved on without having been flexed: not another catch
+    assert {move(joint, 139.0 + i, 100.0, 1.3 + 0.01 * i) for i in range(5)} == {
+        PRE_CATCH
+    }
+    assert move(joint, 100.0, -60.0, 2.0) == PRE_CATCH
+    assert stretch(3.0) == once
+    assert move(joint, 100.0, -60.0, 5.0) == PRE_CATCH
+    for i in range(60):
+        last = move(joint, 30.0 + i, 100.0, 6.0 + 0.01 * i)
+    assert last == CATCH
+    assert move(joint, 84.0, -20.0, 6.6) == PRE_CATCH  # flexing ends a catch, too

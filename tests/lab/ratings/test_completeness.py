@@ -56,10 +56,6 @@ def call(*words: object) -> tuple[int, str]:
     return result.exit_code, f"{result.stderr}{result.exception}"
 
 
-def remarks(study: StudyPaths) -> tuple[str, ...]:
-    return study_remarks(study, read_protocol(study.protocol))
-
-
 def take_off(study: StudyPaths, rater: str) -> Protocol:
     text = study.protocol.read_text(encoding="utf-8")
     text = text.replace(f'raters = ["R1", "{rater}"]', 'raters = ["R1"]')
@@ -97,7 +93,7 @@ IN_REPORT = {
 
 
 def test_a_study_as_it_should_be_has_no_remarks(study: StudyPaths) -> None:
-    assert remarks(study) == ()
+    assert study_remarks(study, read_protocol(study.protocol)) == ()
     for verb in DOWNSTREAM:
         assert "note:" not in call(verb, study.root)[1]
 

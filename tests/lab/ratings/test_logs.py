@@ -65,6 +65,7 @@ def test_the_speed_is_that_of_the_presentation_before_the_grade(
     assert (first["grade"], first["mean_speed_deg_s"]) == ("1", 12.5)
     assert (first["n_stretches"], first["speeds_deg_s"]) == (1, (12.5,))
     assert first["felt"] is None
+    assert first["n_attempts"] == 2
 
 
 def test_repeats_of_a_model_are_kept_apart(new_study: Callable[..., Small]) -> None:

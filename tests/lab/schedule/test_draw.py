@@ -16,10 +16,6 @@ from tests.lab.schedule.studies import protocol_of, words_of
 PUBLISHED = Path(__file__).parents[3] / "studies" / "hess2012" / "protocol.toml"
 
 
-def order(schedule: Schedule) -> list[str]:
-    return [shown.model for shown in schedule.presentations]
-
-
 def codes(schedule: Schedule) -> list[str]:
     return [shown.code for shown in schedule.presentations]
 
@@ -31,7 +27,8 @@ GOLDEN_CODES = "56D 67C 65N 53W 27T 47W 54U 23K 17M 93K 50T 00H 06B 81D 66C 49Y"
 
 def test_the_draw_of_a_fixed_seed_never_changes() -> None:
     drawn = draw_schedule(read_protocol(PUBLISHED), "R1", "test")
-    assert order(drawn) == GOLDEN_ORDER.split()
+    order = [shown.model for shown in drawn.presentations]
+    assert order == GOLDEN_ORDER.split()
     assert codes(drawn) == GOLDEN_CODES.split()
 
 

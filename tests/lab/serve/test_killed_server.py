@@ -88,11 +88,6 @@ class Tablet:
         return dict(ANSWERS[state["screen"]])
 
 
-def taken(study: StudyPaths) -> dict[str, int]:
-    """Samples of the presentation that goes on, by its file."""
-    return {file.stem: samples_in(file) for file in study.sessions.glob("*/*.partial")}
-
-
 def rest(server: Served) -> None:
     """Return when the process of the session has ended by itself."""
     until = time.monotonic() + PATIENCE_S
@@ -148,7 +143,8 @@ def run_until_killed(server: Served, tablet: Tablet, moment: Moment) -> bool:
             time.sleep(0.01)  # it has not begun to listen, or was killed
     killing.cancel()
     server.kill(process)
-    before = taken(server.study)
+    on = server.study.sessions.glob("*/*.partial")  # of the presentation that goes on
+    before = {file.stem: samples_in(file) for file in on}
     rest(server)
     log = server.study.log_file("R1", "test")
     if not log.exists():

@@ -231,18 +231,6 @@ def by_the_browser(study: StudyPaths, rater: Rater) -> None:
 ASKED = ("ready", "grade", "break", "question", "over")
 
 
-def facts(study: StudyPaths) -> list[tuple[str, dict[str, object]]]:
-    # all but times and source
-    log = read_log(study.log_file("R1", "test"))
-    return [
-        (
-            event.kind,
-            {key: event.fields[key] for key in event.fields if key != "grades"},
-        )
-        for event in log
-    ]
-
-
 SOURCES = {"console": at_the_console, "browser": by_the_browser}
 
 
@@ -260,7 +248,13 @@ def graded(study: StudyPaths, *sources: str) -> list[tuple[str, dict[str, object
     assert by_position == [sources[0]] * 2 + [sources[1]] * 2  # left at a break
     answers = answers_from_logs(copy, read_protocol(copy.protocol))
     assert {each.grades_from for each in answers} == set(sources)
-    return facts(copy)
+    return [  # all but times and source
+        (
+            event.kind,
+            {key: event.fields[key] for key in event.fields if key != "grades"},
+        )
+        for event in log
+    ]
 
 
 @pytest.mark.slow

@@ -146,8 +146,9 @@ class Rater(Visitor):
 
     def choose(self, text: str) -> None:
         """Choose one of what is offered, by a tap on its text."""
+        exactly = re.compile(f"^{re.escape(text)}$")
         self.page.locator("label.choice").filter(
-            has=self.page.locator("b", has_text=exactly(text))
+            has=self.page.locator("b", has_text=exactly)
         ).first.tap()
 
     def begin(self) -> None:
@@ -204,8 +205,3 @@ class Rater(Visitor):
             self.answer()
         assert shown in screens, f"came to {shown}, not to {screens}: {self.text}"
         return shown
-
-
-def exactly(text: str) -> re.Pattern[str]:
-    """Return a pattern of this text and no other."""
-    return re.compile(f"^{re.escape(text)}$")
