@@ -30,7 +30,8 @@ from masrel.agreement.icc import _Anova, _too_few
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval
 
-_Parts = list[tuple[float, float]]  # of a variance, each with its degrees of freedom
+_VarianceParts = list[tuple[float, float]]
+"""What adds up to a variance, each part with its degrees of freedom."""
 
 ErrorKind = Literal["agreement", "consistency"]
 """Whether what raters differ by on average is error, or not."""
@@ -164,17 +165,24 @@ def _error(
     kind: ErrorKind,
     categories: Sequence[Label] | None,
     level: float,
+    more: _VarianceParts | None = None,
 ) -> Estimate:
+    # more: what else adds up to the variance
     check_option("kind", kind, get_args(ErrorKind))
     check_level(level)
     values = rated_part(rating_values(ratings, categories))
     variance_parts = _variance_parts(values, kind)
     value, interval, reason = math.nan, None, None
     if isinstance(variance_parts, str):
-        title = {"sem": "the standard error of measurement", "mdc": "MDC95"}[name]
-        reason = undefined(title, variance_parts)
+        titles = {
+            "sem": "the standard error of measurement",
+            "mdc": "MDC95",
+            "limit": "the limit of agreement with the mean",
+        }
+        reason = undefined(titles[name], variance_parts)
     else:
         parts, unit, notes = variance_parts
+        parts = parts + [(square / unit**2, df) for square, df in more or ()]
         scale, variance = factor * unit, sum(square for square, _ in parts)
         value = scale * math.sqrt(variance)
         low, high, why = _variance_ends(parts, variance, level)
@@ -195,7 +203,7 @@ def _error(
 
 def _variance_parts(
     values: Floats, kind: ErrorKind
-) -> tuple[_Parts, float, tuple[str, ...]] | str:
+) -> tuple[_VarianceParts, float, tuple[str, ...]] | str:
     """Return what adds up to the error's variance, its unit and notes, or why not."""
     n, k = values.shape
     if n < 2 or k < 2:
@@ -226,7 +234,7 @@ def _variance_parts(
 
 def _parts(
     kind: ErrorKind, raters: float, residual: float, df: tuple[float, float], m: float
-) -> _Parts:
+) -> _VarianceParts:
     # of mean squares, that of raters being the residual's and m times their variance
     if kind == "consistency":
         return [(residual, df[1])]
@@ -234,9 +242,10 @@ def _parts(
 
 
 def _variance_ends(
-    parts: _Parts, variance: float, level: float
+    parts: _VarianceParts, variance: float, level: float
 ) -> tuple[float, float, str | None]:
-    # Equations (1.3) and (1.4) of [2]; of a single part they are those of χ².
+    """Return the ends of a sum of mean squares, each with its df, or why not."""
+    # Graybill and Wang (1980), eq. (1.3) and (1.4); of a single part those of χ²
     from scipy.special import chdtri
 
     down = up = 0.0

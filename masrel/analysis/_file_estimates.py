@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from masrel._input import refuse, split_names
 from masrel.errors import MasrelError, ParameterError, RatingsError
@@ -119,6 +119,9 @@ class Questions(Estimating):
     indices: bool = False
     reference: str | None = None
     unit: str | None = None
+    # of limits: what repeats are of, and whether they follow a line or are ratios
+    truth: Literal["constant", "varying"] | None = None
+    kind: Literal["proportional", "ratio"] | None = None
     clusters: tuple[str, ...] = ()  # that of every item of the part, if items have any
     judging: "Judging | None" = None
 
@@ -151,7 +154,7 @@ class Questions(Estimating):
                 "target": self.target,
                 "level": self.level,
             }
-        options = {"metric": self.metric, "convention": self.convention}
+        of_some = ("metric", "convention", "truth", "kind")
         return {
             "coefficients": self.names,
             "weights": str(self.weights),
@@ -166,7 +169,7 @@ class Questions(Estimating):
             "resamples": self.n_resamples,
             "seed": self.seed,
             "words": self.words,
-            **{name: value for name, value in options.items() if value is not None},
+            **{of: x for of in of_some if (x := getattr(self, of)) is not None},
         }
 
     def checked(self, clusters: str | None) -> "Questions":
@@ -234,7 +237,7 @@ class Questions(Estimating):
     def between_raters(self, file: "RatingsFile") -> "Questions | None":
         """Return what is estimated between raters; None where that is nothing."""
         are_alone = self.retest and all(len(part.raters) == 1 for part in file.parts)
-        if self.judging is not None or are_alone:
+        if self.judging is not None or self.truth is not None or are_alone:
             return None
         if not self.retest or self.coefficients is None:
             return self
@@ -291,6 +294,9 @@ class Explanation(str):
 
 # Notes that stand below a table at once
 _TEXTS = {
+    "constant": "Repeats: {n} measurements in all; an item has one true value.",
+    "varying": "Repeats: {n} measurements in pairs; the true value of an item may move "
+    "from one pair to the next.",
     "left_out": "{group}Left out: {names}.",
     "pair": "Difference: {pair}.",
     "reference": "{rater} is the reference, and in no other estimate between raters.",
@@ -322,6 +328,21 @@ _EXPLANATIONS = {
     "largest": "Largest κ: what the margins of the raters allow.",
     "limits": "Limits: mean ∓ 1.96 standard deviations, between which 95 % of "
     "differences lie if they are normal.",
+    **{
+        f"limits_{kind}": f"Limits: {middle} ∓ 1.96 standard deviations of the "
+        "difference of two single measurements, between which 95 % lie if they are "
+        "normal."
+        for kind, middle in (
+            ("with_repeats", "mean"),
+            ("that_follow", "line"),
+            ("of_ratios", "mean of logarithms"),
+        )
+    },
+    "mover_ends": "{level} % CI: of the mean t, of the slope t with HC3 errors, of "
+    "limits MOVER; for other items like these, measured by the same raters.",
+    "limits_with_mean": "Limit: 1.96 √((k − 1)/k) SEM on either side of the mean of "
+    "all k raters. MDC95: 1.96 √2 SEM. {level} % CI: modified large sample; for other "
+    "items and raters.",
     "exact_ends": "{level} % CI: exact (t, noncentral t), each for itself; "
     "both: for the two limits together, factors of tolerance; for other items like "
     "these, rated by the same raters.",

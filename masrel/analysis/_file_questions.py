@@ -19,6 +19,7 @@ from masrel._input import listed, refuse
 from masrel.agreement import (
     CodedRatings,
     Label,
+    RepeatedLimits,
     Significance,
     Weights,
     bhapkar,
@@ -31,11 +32,14 @@ from masrel.agreement import (
     contingency_table,
     kappa_max,
     limits_of_agreement,
+    limits_with_mean,
+    limits_with_repeats,
     mcnemar,
     prevalence_index,
     specific_agreement,
     stuart_maxwell,
 )
+from masrel.agreement._codes import rating_values
 from masrel.analysis._file_comparisons import comparisons
 from masrel.analysis._file_estimates import (
     AgreementRow,
@@ -58,6 +62,7 @@ from masrel.errors import (
     RatingsError,
     UndefinedStatisticWarning,
 )
+from masrel.estimates import Interval, as_document
 from masrel.ratings import RatingsFile, RatingsPart
 
 if TYPE_CHECKING:
@@ -80,15 +85,25 @@ def answers(
     """Return the ratings without a reference, and the answers, agreement first."""
     # more: questions of one command alone
     sessions = list(dict.fromkeys(str(part.session) for part in file.parts))
-    retest = ", --retest compares them" * (questions.command == "agree")
+    of_command = {
+        "agree": ", --retest compares them",
+        "limits": ", --truth takes them as repeats",
+    }
     refuse(
         (
             len(sessions) > 1 and not questions.retest,
             f"{file.read['file']}: holds {len(sessions)} sessions "
             f"({', '.join(sessions)}), so that raters graded the same item more than "
-            f"once; --by {file.read['session']} estimates each{retest}",
+            f"once; --by {file.read['session']} estimates each"
+            f"{of_command.get(questions.command, '')}",
         ),
         error=RatingsError,
+    )
+    refuse(
+        (
+            file.read["repeated"] == "each" and questions.truth is None,
+            "--repeated each: is for masrel limits --truth alone",
+        )
     )
     if questions.weights != "identity" and not isinstance(questions.weights, Weights):
         check_order(file, f"--weights {questions.weights}")
@@ -428,47 +443,142 @@ def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:
 
 
 _QUANTITIES = {"mean": "Mean", "lower": "Lower limit", "upper": "Upper limit"}
+# What limits are of to the name of their answer, and of the notes on it
+_LIMITS = {
+    "once": ("limits_of_agreement", "limits", "exact_ends"),
+    "mean": ("limits_with_mean", "limits_with_mean"),
+    "difference": ("limits_with_repeats", "limits_with_repeats", "mover_ends"),
+    "proportional": ("limits_that_follow", "limits_that_follow", "mover_ends"),
+    "ratio": ("limits_of_ratios", "limits_of_ratios", "mover_ends"),
+}
 
 
 def _limits(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
-    """Give between which bounds the differences of two raters lie."""
+    """Give between which bounds the measurements of raters differ."""
     check_order(file, file.read["file"])
-    panels = []
-
-    def rows_of(part: RatingsPart) -> Iterator[tuple[Row, ...]]:
-        result = limits_of_agreement(_two_raters(part), level=questions.level)
-        panels.append((part.raters, result))
-        first, second = part.raters
-        of_result = ("n_items", "mean", "sd", "lower", "upper", "share")
-        intervals = {key: getattr(result, f"{key}_interval") for key in _QUANTITIES}
-        ends = {key: {"low": of.low, "high": of.high} for key, of in intervals.items()}
-        row: Row = {
-            "first": first,
-            "second": second,
-            **{key: getattr(result, key) for key in of_result},
-            "level": result.mean_interval.level,
-            **{f"{key}_interval": of for key, of in ends.items()},
-            **{key: getattr(result, key) for key in ("inner", "outer", "reason")},
-        }
-        low, high = zip(result.outer, result.inner, strict=True)
-        of_both = {"lower": low, "upper": high[::-1]}
-        cells = [
-            {"title": title, "quantity": title, "value": row[key], **ends[key]}
-            | dict(zip(("pair_low", "pair_high"), of_both.get(key, ()), strict=False))
-            for key, title in _QUANTITIES.items()
-        ]
-        yield row, *cells
-
-    answer = _table("limits_of_agreement", file, rows_of)
-    pairs = (f"{row['first']} less {row['second']}" for row in answer.rows)
-    notes = [note("pair", pair=pair) for pair in dict.fromkeys(pairs)]
+    panels: list[tuple[Sequence[str], Any]] = []
+    truth, has_more = questions.truth, any(len(of.raters) > 2 for of in file.parts)
+    of_what: str = questions.kind or ("once" if truth is None else "difference")
+    if questions.kind is None and truth != "varying" and has_more:
+        of_what = "mean"
+    name, *texts = _LIMITS[of_what]
+    rows_of = _of_pairs if of_what == "once" else partial(_of_more, of_what)
+    answer = _table(name, file, partial(rows_of, questions, panels))
+    pairs = (
+        f"{row['first']} less {row['second']}"
+        for row in answer.rows
+        if "first" in row and of_what != "ratio"
+    )
+    counts = [np.sum(of.get("n_measurements", 0)) for of in answer.rows]
     groups = (group for _, group, _ in parts_of(file))
     yield replace(
         answer,
-        notes=(*notes, note("limits"), note("exact_ends", level=questions.level)),
-        of=questions.unit or "",
+        notes=(
+            *(note("pair", pair=pair) for pair in dict.fromkeys(pairs)),
+            *(note(of, n=sum(counts)) for of in (truth,) if of is not None),
+            *(note(of, level=questions.level) for of in texts),
+        ),
+        of="" if of_what == "ratio" else questions.unit or "",
         figure=tuple(zip(groups, panels, strict=True)),
     )
+
+
+def _of_pairs(
+    questions: Questions, panels: list[Any], part: RatingsPart
+) -> Iterator[tuple[Row, ...]]:
+    result = limits_of_agreement(_two_raters(part), level=questions.level)
+    panels.append((part.raters, result))
+    first, second = part.raters
+    of_result = ("n_items", "mean", "sd", "lower", "upper", "share")
+    intervals = {key: getattr(result, f"{key}_interval") for key in _QUANTITIES}
+    ends = {key: {"low": of.low, "high": of.high} for key, of in intervals.items()}
+    row: Row = {
+        "first": first,
+        "second": second,
+        **{key: getattr(result, key) for key in of_result},
+        "level": result.mean_interval.level,
+        **{f"{key}_interval": of for key, of in ends.items()},
+        **{key: getattr(result, key) for key in ("inner", "outer", "reason")},
+    }
+    low, high = zip(result.outer, result.inner, strict=True)
+    of_both = {"lower": low, "upper": high[::-1]}
+    cells = [
+        {"title": title, "quantity": title, "value": row[key], **ends[key]}
+        | dict(zip(("pair_low", "pair_high"), of_both.get(key, ()), strict=False))
+        for key, title in _QUANTITIES.items()
+    ]
+    yield row, *cells
+
+
+_ITEM = " item"  # which no rater is called: names have no blanks around
+
+
+def _of_more(
+    of_what: str, questions: Questions, panels: list[Any], part: RatingsPart
+) -> Iterator[tuple[Row, ...]]:
+    import pandas as pd  # of all questions this and that of sessions need it
+
+    coded = code_ratings(part.ratings) if of_what == "mean" else _two_raters(part)
+    values, columns = rating_values(coded, None), list(part.raters)
+    frame = pd.DataFrame(values, columns=columns)  # a row a time
+    frame[_ITEM] = part.items or range(len(values))
+    if of_what == "mean":
+        result: Any = limits_with_mean(
+            frame, item=_ITEM, observers=columns, level=questions.level
+        )
+        of_all = {"Limit, ±": result.limit, "SEM": result.sem, "MDC95": result.mdc}
+        shown = [(title, of.value, of.interval) for title, of in of_all.items()]
+        row: Row = {
+            "raters": part.raters,
+            "n_items": result.sem.n_items,
+            "reason": result.sem.reason,
+        }
+    else:
+        result = limits_with_repeats(
+            frame,
+            item=_ITEM,
+            first=columns[0],
+            second=columns[1],
+            truth=questions.truth or "constant",
+            kind=questions.kind or "difference",
+            level=questions.level,
+        )
+        shown = _of_line(result)
+        row = dict(zip(("first", "second"), part.raters, strict=True))
+    panels.append((part.raters, result))
+    cells = [
+        {"title": title, "quantity": title, "value": value}
+        # the limits, beside low and high ends of each
+        | {f"{end}_limit": getattr(result, end, None) for end in ("low", "high")}
+        | (
+            {}
+            if of is None
+            else {key: getattr(of, key) for key in ("low", "high", "reason")}
+            | {"interval_texts": of.notes}
+        )
+        for title, value, of in shown
+    ]
+    yield {**row, **as_document(result)}, *cells
+
+
+def _of_line(limits: RepeatedLimits) -> list[tuple[str, float, Interval]]:
+    """Return the limits, at both ends of where items are if they follow a line."""
+    follows = limits.kind == "proportional" and limits.reason is None
+    ends = (limits.averages.min(), limits.averages.max()) if follows else (math.nan,)
+    return [
+        *(
+            (
+                f"{title} at {of.average:.4g}" if follows else title,
+                getattr(of, name),
+                getattr(of, f"{name}_interval"),
+            )
+            for of in map(limits.at, ends)
+            for name, title in zip(
+                ("bias", "low", "high"), _QUANTITIES.values(), strict=True
+            )
+        ),
+        ("Slope", limits.slope, limits.slope_interval),
+    ]
 
 
 # ---- raters, pairs and categories ----

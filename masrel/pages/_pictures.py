@@ -18,6 +18,7 @@ from masrel.agreement import (
     COEFFICIENTS,
     CodedRatings,
     Coefficient,
+    RepeatedLimits,
     code_ratings,
     coefficient,
     contingency_table,
@@ -144,8 +145,11 @@ class PartSeen:
     def disagreement(self) -> "NDArray[np.float64]":
         """How far the ratings of each item are apart, (n_items,)."""
         # items of counts are none that one could discuss
-        if self.coded is None or not (
-            self.part.items or self.coded is self.part.ratings
+        # and of repeats every item is there several times
+        if (
+            self.coded is None
+            or self.questions.truth
+            or not (self.part.items or self.coded is self.part.ratings)
         ):
             return np.zeros(0)
         ratings = on_grades(self.coded, self.entry, self.file)
@@ -186,7 +190,13 @@ class PartSeen:
 
 _DRAWERS = {
     "diagnosis_pairs": "masrel.plots._rater_pairs:pairs_pictures",
-    "limits_of_agreement": "masrel.plots._limits_figure:limits_pictures",
+    **dict.fromkeys(
+        (
+            *("limits_of_agreement", "limits_with_repeats", "limits_that_follow"),
+            *("limits_of_ratios", "limits_with_mean"),
+        ),
+        "masrel.plots._limits_figure:limits_pictures",
+    ),
 }
 
 
@@ -346,7 +356,8 @@ def forest_drawing(answers: Sequence[Answer], questions: Questions) -> Drawing |
 
 
 def _pairs(seen: PartSeen) -> Drawing | None:
-    of = seen.diagnosis
+    # limits are of measurements, which hardly ever agree
+    of = None if seen.questions.command == "limits" else seen.diagnosis
     if of is None or len(of.raters) < 3 or not np.isfinite(of.pair_values).any():
         return None
     title = seen.questions.title(seen.entry)
@@ -427,20 +438,25 @@ def _categories(seen: PartSeen) -> Drawing | None:
 
 
 def _bland_altman(seen: PartSeen) -> Drawing | None:
-    answer = next((a for a in seen.answers if a.name == "limits_of_agreement"), None)
-    if answer is not None:
-        raters, result = dict(answer.figure)[seen.group]
-    elif seen.coded is None or not seen.is_measured or len(seen.raters) != 2:
-        return None
+    for answer in seen.answers:
+        if answer.name.startswith("limits"):
+            raters, result = dict(answer.figure)[seen.group]
+            break
     else:
+        if seen.coded is None or not seen.is_measured or len(seen.raters) != 2:
+            return None
         raters = seen.raters
         result = limits_of_agreement(seen.coded, level=seen.questions.level)
     return seen.drawing(
         "bland_altman",
         "masrel.plots._limits_figure:limits_pictures",
         ([("", (raters, result))], seen.questions.unit or ""),
-        f"Difference of {raters[0]} and {raters[1]} over their mean, with the mean "
-        "difference and the limits between which 95 % of differences are expected.",
+        f"{' and '.join(raters)} against their mean: how far they lie apart, and the "
+        "limits between which 95 % of single measurements are expected."
+        if len(raters) > 2 or isinstance(result, RepeatedLimits)
+        else f"Difference of {raters[0]} and {raters[1]} over their mean, with the "
+        "mean difference and the limits between which 95 % of differences are "
+        "expected.",
     )
 
 
@@ -451,7 +467,7 @@ def _components(seen: PartSeen) -> Drawing | None:
     parts = variance_components(seen.coded)
     return seen.drawing(
         "components",
-        "masrel.plots._components:components_picture",
+        "masrel.plots._rater_pairs:components_picture",
         (parts,),
         "Variance of a rating: between items, between raters, and the rest, as shares.",
     )

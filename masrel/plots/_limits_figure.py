@@ -1,4 +1,4 @@
-"""Differences of two raters against their mean, with the limits of agreement.
+"""Differences of raters against their mean, with the limits of agreement.
 
 Items at one place are one dot, the larger the more there are. Where there are too many
 places for dots the plane is in hexagons, the darker the more items are in each.
@@ -6,6 +6,7 @@ places for dots the plane is in hexagons, the darker the more items are in each.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -30,33 +31,45 @@ from masrel.plots._style import (
 from masrel.tables._tables import counted, fixed_or_significant, percent
 
 if TYPE_CHECKING:
-    from masrel.agreement import LimitsOfAgreement
+    from masrel.agreement import LimitsOfAgreement, LimitsWithMean, RepeatedLimits
+    from masrel.estimates import Interval
 
-    # what a part is called, its two raters, and their limits
-    Panel = tuple[str, tuple[Sequence[str], LimitsOfAgreement]]
+    Limits = LimitsOfAgreement | RepeatedLimits | LimitsWithMean
+    # what a part is called, its raters, and their limits
+    Panel = tuple[str, tuple[Sequence[str], Limits]]
 
 _MAX_DOTS = 2000
 _MAX_IN_A_LINE = 24  # letters of both raters
 _DOT: dict[str, Any] = {"color": BLUE, "alpha": 0.75}
 _SMALLEST, _LARGEST = 14.0, 160.0  # areas of dots, points²
 _LIMIT: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (6, 2))}
+# Lines of limits of two raters, and what they are there
+_NAMES = {
+    "LimitsOfAgreement": {
+        "upper limit": "upper",
+        "mean": "mean",
+        "lower limit": "lower",
+    },
+    "RepeatedLimits": {"upper limit": "high", "mean": "bias", "lower limit": "low"},
+}
 
 
 def bland_altman(
-    limits: "LimitsOfAgreement",
+    limits: "Limits",
     *,
     raters: Sequence[str] = ("first", "second"),
     unit: str = "",
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw the differences of two raters against their means, with their limits.
+    """Draw the differences of raters against their means, with their limits.
 
     Parameters
     ----------
-    limits : LimitsOfAgreement
-        What `masrel.agreement.limits_of_agreement` returns.
+    limits : LimitsOfAgreement, RepeatedLimits or LimitsWithMean
+        What `masrel.agreement.limits_of_agreement`, `limits_with_repeats` or
+        `limits_with_mean` returns.
     raters : sequence of str, optional
-        What the two raters are called.
+        What the two raters are called; those of limits with the mean are counted.
     unit : str, optional
         Unit of the measurements, such as deg.
     ax : Axes, optional
@@ -96,16 +109,48 @@ def limits_pictures(panels: "Sequence[Panel]", unit: str) -> list[tuple[str, Pic
     ]
 
 
-def _ends(panel: "LimitsOfAgreement") -> list[float]:
+def _same(panel: "Limits") -> float:
+    # where two that are the same lie: no difference, or a ratio of 1
+    return float(getattr(panel, "kind", None) == "ratio")
+
+
+def _lines_at(panel: Any) -> "list[tuple[str, float, Interval]]":
+    """Return what each line is called, where it is, and its interval."""
+    if hasattr(panel, "limit"):  # with the mean: as far on either side
+        limit, ends = panel.limit.value, panel.limit.interval
+        below = ends and replace(ends, low=-ends.high, high=-ends.low)
+        return [("limit", limit, ends), ("limit", -limit, below)] if ends else []
+    return [
+        (called, getattr(panel, name), getattr(panel, f"{name}_interval"))
+        for called, name in _NAMES[type(panel).__name__].items()
+    ]
+
+
+def _lines(panel: Any) -> "tuple[list[float], list[list[tuple[str, float, Interval]]]]":
+    """Return places along the means, and the lines there; level ones from 0 to 1."""
+    if getattr(panel, "kind", None) != "proportional" or panel.reason is not None:
+        return [0.0, 1.0], [_lines_at(panel)] * 2
+    places = np.linspace(panel.averages.min(), panel.averages.max(), 60).tolist()
+    return places, [_lines_at(panel.at(place)) for place in places]
+
+
+def _ends(panel: "Limits") -> list[float]:
     # what the axis of the differences is to show
-    shown = [0.0, *panel.differences.tolist()]
-    of = (panel.lower_interval, panel.upper_interval)
-    return shown + [x for end in of for x in (end.low, end.high) if math.isfinite(x)]
+    return [
+        *(_same(panel), *panel.differences.tolist()),
+        *(
+            x
+            for lines in _lines(panel)[1]
+            for *_, of in lines
+            for x in (of.low, of.high)
+            if math.isfinite(x)
+        ),
+    ]
 
 
 def _draw(
     raters: Sequence[str],
-    panel: "LimitsOfAgreement",
+    panel: "Limits",
     dots: tuple[NDArray[np.float64], NDArray[np.intp]],
     most: int,
     unit: str,
@@ -122,10 +167,13 @@ def _draw(
             at[:, 0], at[:, 1], s=area * freq, **_DOT, linewidths=0.0, zorder=3.0
         )
     of_unit = f" ({unit})" if unit else ""
-    first, second = short_names(raters)
-    space = "\n" if len(first) + len(second) > _MAX_IN_A_LINE else " "
-    axes.set_xlabel(f"mean of {first}{space}and {second}{of_unit}")
-    axes.set_ylabel(f"{first} −{space}{second}{of_unit}")
+    mean, less = counted(len(raters), "rater"), "each rater − mean"
+    if not hasattr(panel, "limit"):
+        first, second = short_names(raters)
+        space = "\n" if len(first) + len(second) > _MAX_IN_A_LINE else " "
+        mean = f"{first}{space}and {second}"
+        less = f"{first} {'−/'[int(_same(panel))]}{space}{second}"
+    axes.set(xlabel=f"mean of {mean}{of_unit}", ylabel=f"{less}{of_unit}")
     axes.margins(x=0.06)
     axes.set_ylim(*reach)
     mark = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0, **_DOT}
@@ -134,12 +182,16 @@ def _draw(
         for n in (1, most)
         if most > 1 and len(freq) <= _MAX_DOTS
     ]
-    name = f"{percent(panel.mean_interval.level)} % confidence interval, exact"
-    band = Line2D([], [], color=GREY, alpha=0.3, linewidth=6.0, label=name)
-    legend_below(axes, [*marks, band], ncols=3)
+    for *_, ends in _lines_at(panel)[:1]:
+        name = (
+            f"{percent(ends.level)} % confidence interval"
+            f"{', exact' * (type(panel).__name__ == 'LimitsOfAgreement')}"
+        )
+        marks.append(Line2D([], [], color=GREY, alpha=0.3, linewidth=6.0, label=name))
+    legend_below(axes, marks, ncols=3)
 
 
-def _draw_hexagons(axes: Axes, panel: "LimitsOfAgreement") -> None:
+def _draw_hexagons(axes: Axes, panel: "Limits") -> None:
     drawn = axes.hexbin(
         panel.averages,
         panel.differences,
@@ -158,23 +210,26 @@ def _draw_hexagons(axes: Axes, panel: "LimitsOfAgreement") -> None:
     bar.minorformatter = LogFormatter()
 
 
-def _draw_lines(axes: Axes, panel: "LimitsOfAgreement") -> None:
-    axes.axhline(0.0, color=GREY, linewidth=0.7, linestyle=DASHES, zorder=1.0)
-    if math.isnan(panel.mean):
-        return
-    for name, value, ends, look in (
-        ("upper limit", panel.upper, panel.upper_interval, _LIMIT),
-        ("mean", panel.mean, panel.mean_interval, {"color": BLACK}),
-        ("lower limit", panel.lower, panel.lower_interval, _LIMIT),
-    ):
-        axes.axhspan(
-            ends.low, ends.high, color=GREY, alpha=0.16, linewidth=0.0, zorder=0.5
-        )
-        axes.axhline(value, linewidth=1.2, zorder=2.0, **look)
-        text = fixed_or_significant(value, 2).replace("-", "−")
+def _draw_lines(axes: Axes, panel: "Limits") -> None:
+    axes.axhline(_same(panel), color=GREY, linewidth=0.7, linestyle=DASHES, zorder=1.0)
+    places, lines = _lines(panel)
+    # level ones from one side of the axes to the other
+    across = axes.transData if len(places) > 2 else axes.get_yaxis_transform()
+    for line in zip(*lines, strict=True):
+        (name, *_), values, ends = zip(*line, strict=True)
+        if math.isnan(values[-1]):
+            return
+        look = {"color": BLACK} if name == "mean" else _LIMIT
+        band = [of.low for of in ends], [of.high for of in ends]
+        axes.fill_between(
+            places, *band, color=GREY, alpha=0.16, linewidth=0.0, zorder=0.5,
+            transform=across,
+        )  # fmt: skip
+        axes.plot(places, values, linewidth=1.2, zorder=2.0, transform=across, **look)
+        text = fixed_or_significant(values[-1], 2).replace("-", "−")
         axes.annotate(
             f"{name}\n{text}",
-            (1.0, value),
+            (1.0, values[-1]),
             xycoords=("axes fraction", "data"),
             xytext=(4, 0),
             textcoords="offset points",

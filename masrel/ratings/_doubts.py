@@ -101,7 +101,8 @@ def doubt_columns(
     if not (options.names_at or sheet.is_transposed):
         findings += _second_header(sheet, codes, scale, freq)
     # an item that is there twice is refused below, and no column is one of raters
-    is_long = options.repeated == "error" and layout.session == layout.by is None
+    is_kept = options.repeated in ("error", "each")
+    is_long = is_kept and layout.session == layout.by is None
     is_long &= any(
         len(sheet.columns[p].texts) < len(sheet.numbers) for p in layout.item[:1]
     )

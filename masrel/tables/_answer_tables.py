@@ -49,6 +49,10 @@ _CAPTIONS = {
     "symmetry": "Do the changes from one rater to the other balance?",
     "indices": "Prevalence, bias and agreement on each category",
     "limits_of_agreement": "Limits of agreement{in_unit}",
+    "limits_with_repeats": "Limits of agreement{in_unit}",
+    "limits_that_follow": "Limits of agreement on a line{in_unit}",
+    "limits_of_ratios": "Limits of agreement, as ratios",
+    "limits_with_mean": "Limits of agreement with the mean{in_unit}",
     "diagnosis_raters": "What each rater adds to {of}",
     "diagnosis_pairs": "{of} of every two raters",
     "diagnosis_categories": "Agreement on each category",
@@ -66,6 +70,7 @@ _CAPTIONS = {
     "gates": "Gates",
     "differences": "Differences of agreement between groups",
     "equality": "Equality of agreement in all groups",
+    "spans": "Agreement on spans",
 }
 
 _P = Column(key="p_value", heading="p", is_p=True)
@@ -84,6 +89,15 @@ _COEFFICIENT = (
 )
 
 _COLUMNS: dict[str, tuple[Column, ...]] = {
+    **{
+        f"limits_{of}": (
+            Column(key="quantity", heading="Quantity", align="left"),
+            _VALUE,
+            *_ENDS,
+            _ITEMS,
+        )
+        for of in ("with_repeats", "that_follow", "of_ratios", "with_mean")
+    },
     "symmetry": (
         Column(key="test", heading="Test", align="left"),
         Column(key="statistic", heading="Statistic", digits=3),

@@ -149,7 +149,8 @@ def reading_warnings(ratings: RatingsFile, first: Answer) -> tuple[Finding, ...]
     # of measurements it is warned unless all coefficients weigh how far they lie from
     # each other
     estimates = [row.estimate for row in first.estimates if first.name == "agreement"]
-    is_warned = not estimates or any(
+    # and of limits, whose grades need not be alike
+    is_warned = not (estimates or first.name.startswith("limits")) or any(
         not COEFFICIENTS[estimate.coefficient].needs_order
         and estimate.weights in ("identity", "nominal")
         for estimate in estimates
@@ -185,6 +186,27 @@ _RESULTS = {
         "{first} less {second}{group} is {mean}{unit} on average; 95 % of such "
         "differences are expected between {lower} and {upper}{unit}.",
     ),
+    "limits_with_repeats": (
+        "value",
+        "{first} less {second}{group} is {value}{unit} on average; 95 % of such "
+        "differences are expected between {low_limit} and {high_limit}{unit}.",
+    ),
+    "limits_that_follow": (
+        "value",
+        "{first} less {second}{group} changes by {slope} for each unit of their mean; "
+        "where that is {average}{unit}, 95 % of such differences are expected between "
+        "{low_limit} and {high_limit}{unit}.",
+    ),
+    "limits_of_ratios": (
+        "value",
+        "{first} is {value} times {second}{group} on average; 95 % of such ratios are "
+        "expected between {low_limit} and {high_limit}.",
+    ),
+    "limits_with_mean": (
+        "value",
+        "95 % of single measurements{group} are expected within {value}{unit} of the "
+        "mean of all raters.",
+    ),
 }
 
 
@@ -197,7 +219,7 @@ def result_sentence(answered: Sequence[Answer], items: str) -> tuple[int, str]:
         key, text = _RESULTS.get(name, ("", ""))
         if known := [row for row in rows if (x := row.get(key)) is not None and x == x]:
             row = max(known, key=_says_most)
-            in_units = name == "limits_of_agreement"
+            in_units = name.startswith("limits")
             words = {key: number(x, 3, in_units=in_units) for key, x in row.items()}
             words |= {
                 "of": of,
@@ -207,6 +229,8 @@ def result_sentence(answered: Sequence[Answer], items: str) -> tuple[int, str]:
                 "group": f" ({row['group']})" if row.get("group") else "",
             }
             return at, text.format(**words)
+    if not answered[0].estimates:
+        return 0, "The limits of agreement are undefined."
     return 0, _agreement(answered[0], items)
 
 

@@ -1,0 +1,540 @@
+"""Limits of agreement beyond two raters once each: repeats, slopes, several observers.
+
+In: one row a measurement of an item, a column for each method or observer. Out: limits
+with their intervals, for single measurements.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from statistics import NormalDist
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel._input import check_option, refuse
+from masrel.agreement._codes import check_frame, levels, numbers, rated_part
+from masrel.agreement._engine import Floats, check_level, divide, undefined
+from masrel.agreement.measurement import (
+    _CHANGE,
+    _ROUNDING,
+    _error,
+    _variance_ends,
+)
+from masrel.errors import RatingsError
+from masrel.estimates import Estimate, Interval, _Caution
+
+# Whether what is measured of an item stays, or moves from a pair to the next
+_Truth = Literal["constant", "varying"]
+# Whether limits are of differences, follow what is measured, or are of ratios
+_LimitsKind = Literal["difference", "proportional", "ratio"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RepeatedLimits:
+    """Between which bounds single differences, or ratios, of two methods lie.
+
+    Attributes
+    ----------
+    bias : float
+        Mean difference, first less second, each item counting once; or how many times
+        the second the first is, by the geometric mean.
+    sd : float
+        Standard deviation of the difference of two single measurements; of that of
+        their logarithms where the kind is ratio; about the line where it is
+        proportional.
+    low, high : float
+        The limits: bias ∓ z sd; ``nan`` when undefined.
+    share : float
+        Of the differences that are to lie between the limits.
+    bias_interval, low_interval, high_interval : Interval
+        For other items like these, each for itself.
+    slope : float
+        By how much the difference grows with the mean of both methods, both of
+        logarithms where the kind is ratio.
+    slope_interval : Interval
+        That of the slope, by errors that do not take differences to spread alike.
+    average : float
+        The mean of both methods at which bias and limits are these; of the kind
+        proportional alone they are others elsewhere.
+    truth, kind : str
+        What was taken to stay the same, and what the limits are of.
+    parts : tuple of tuple of float
+        What sd² is made of, each with its degrees of freedom: the variance of items'
+        mean differences, and what single measurements add to it.
+    within : tuple of float
+        Variance of repeated measurements of an item by either method; of repeated
+        differences where the truth varies; ``nan`` without repeats.
+    averages, differences : ndarray, shape (n_items,)
+        Mean of both methods, and their difference or ratio, of each item.
+    n_items : int
+        Items that both measured.
+    n_measurements : tuple of int
+        Measurements of either method, of all items.
+    reason : str or None
+        Why they are undefined, or None.
+    """
+
+    bias: float
+    sd: float
+    low: float
+    high: float
+    share: float
+    bias_interval: Interval
+    low_interval: Interval
+    high_interval: Interval
+    slope: float
+    slope_interval: Interval
+    average: float
+    truth: _Truth
+    kind: _LimitsKind
+    parts: tuple[tuple[float, float], ...]
+    within: tuple[float, ...]
+    averages: Floats = field(compare=False, repr=False)
+    differences: Floats = field(compare=False, repr=False)
+    n_items: int
+    n_measurements: tuple[int, ...]
+    reason: str | None = None
+
+    def at(self, average: float) -> "RepeatedLimits":
+        """Return the same where both methods have another mean.
+
+        Parameters
+        ----------
+        average : float
+            The mean of both methods.
+
+        Returns
+        -------
+        RepeatedLimits
+            With the bias, limits and intervals there; the same everywhere unless the
+            kind is proportional.
+        """
+        if self.kind != "proportional" or self.reason is not None:
+            return self
+        moved = self.slope * (average - self.average)
+        return _ended(replace(self, bias=self.bias + moved, average=average))
+
+
+def limits_with_repeats(
+    data: Any,
+    *,
+    item: str,
+    first: str,
+    second: str,
+    truth: _Truth = "constant",
+    kind: _LimitsKind = "difference",
+    share: float = 0.95,
+    level: float = 0.95,
+) -> RepeatedLimits:
+    """Estimate the limits of agreement of two methods, which may measure repeatedly.
+
+    Parameters
+    ----------
+    data : DataFrame
+        One row a measurement of an item by either method, or by both.
+    item, first, second : str
+        Names of the columns of items and of what each method measured; a number that is
+        missing was not measured.
+    truth : {"constant", "varying"}, optional
+        Whether an item has one true value, so that either method may repeat it in rows
+        of its own; or a row is a pair that was taken together of a value that may move.
+    kind : {"difference", "proportional", "ratio"}, optional
+        Of differences alike whatever is measured; of differences that follow the mean
+        of both methods in a line; or of ratios, by logarithms.
+    share : float, optional
+        Of the differences of single measurements that are to lie between the limits.
+    level : float, optional
+        Level of the intervals.
+
+    Returns
+    -------
+    RepeatedLimits
+        Bias, slope and limits with their intervals, for other items like these.
+
+    Raises
+    ------
+    RatingsError
+        If a column is not there or has no numbers, an item has no name, or the kind is
+        ratio and a number is not above 0.
+    ParameterError
+        If `truth` or `kind` is unknown, or the share or the level is not within (0, 1).
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If fewer than two items were measured by both methods; three, with different
+        means, where the kind is proportional.
+
+    Notes
+    -----
+    Differences are taken to be normal, about their mean or a line, and to spread as
+    much whatever is measured. Of a constant truth the variance of a single difference
+    is that of the items' mean differences, and (1 − 1/m) of each method's within items,
+    with m the harmonic mean of its measurements of an item [1]_, table I. The intervals
+    of the limits combine those of the bias and of each variance (MOVER), with a note
+    where numbers of repeats differ so much that they may be too short; the bias itself
+    has Student's t. The line is that of items' means by least squares [2]_, its
+    slope's error HC3 [3]_. Items that one method did not measure are left out.
+
+    References
+    ----------
+    .. [1] Zou, G. Y. (2013). Confidence interval estimation for the Bland-Altman limits
+       of agreement with multiple observations per individual. Statistical Methods in
+       Medical Research, 22(6), 630-642. https://doi.org/10.1177/0962280211402548
+    .. [2] Bland, J. M., Altman, D. G. (1999). Measuring agreement in method comparison
+       studies. Statistical Methods in Medical Research, 8(2), 135-160.
+       https://doi.org/10.1177/096228029900800204
+    .. [3] MacKinnon, J. G., White, H. (1985). Some heteroskedasticity-consistent
+       covariance matrix estimators with improved finite sample properties. Journal of
+       Econometrics, 29(3), 305-325. https://doi.org/10.1016/0304-4076(85)90158-7
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> frame = pd.DataFrame({"item": [1, 1, 2, 2, 3, 3], "x": [9, 8, 5, 5, 2, 3],
+    ...                       "y": [8, 8, 6, 5, 2, 1]})
+    >>> limits = limits_with_repeats(frame, item="item", first="x", second="y")
+    >>> print(f"{limits.bias:.2f}, {limits.low:.2f} to {limits.high:.2f}")
+    0.33, -1.54 to 2.21
+    """
+    check_option("truth", truth, get_args(_Truth))
+    check_option("kind", kind, get_args(_LimitsKind))
+    check_level(share, "share")
+    check_level(level)
+    check_frame(data, (item, first, second), "data")
+    codes, items = levels(data[item], item)
+    x, y = (_values(data, name, kind) for name in (first, second))
+    # of pairs, a row without its second says nothing
+    x, y = (x + 0.0 * y, y + 0.0 * x) if truth == "varying" else (x, y)
+    cells = [_cells(codes, values, len(items)) for values in (x, y)]
+    chosen = (cells[0][0] > 0.0) & (cells[1][0] > 0.0)
+    (_, of_x, _), (_, of_y, _) = (of[:, chosen] for of in cells)
+    averages, differences = 0.5 * (of_x + of_y), of_x - of_y  # (n_items,)
+    slope, error, flat = _slope(averages, differences)
+    n, is_line = len(differences), kind == "proportional"
+    reason = flat if is_line or n < 2 else None
+    if reason is not None:
+        undefined("the limits of agreement", reason)
+    # what is left of differences without the line, where there is one
+    lean, df = (slope, n - 2.0) if is_line else (0.0, n - 1.0)
+    residuals = differences - lean * averages
+    rows = [x - y - 0.5 * lean * (x + y)] if truth == "varying" else [x, y]
+    repeats = [_cells(codes, of, len(items))[:, chosen] for of in rows]
+    within, parts = zip(*map(_within, repeats), strict=True)
+    between = math.nan if reason else n * float(residuals.var()) / df
+    # where repeats make items' mean differences vary so unequally, by the SD of what
+    # they add to the variance, intervals of 95 % held the limits in less than 93 %
+    is_uneven = n > 1 and bool(
+        np.sum(
+            [s2 / of[0] for s2, of in zip(within, repeats, strict=True)], axis=0
+        ).std()
+        > 0.6 * between
+    )
+    nothing = Interval(
+        low=math.nan,
+        high=math.nan,
+        level=level,
+        kind="confidence",
+        method="MOVER",
+        target="items",
+        notes=(
+            _Caution(
+                "numbers of repeats differ much from item to item: it may hold the "
+                "limit less often than it says"
+            ),
+        )
+        * is_uneven,
+    )
+    result = _ended(
+        RepeatedLimits(
+            bias=math.nan if reason else float(differences.mean()),
+            sd=math.sqrt(between + sum(part for part, _ in parts)),
+            low=math.nan,
+            high=math.nan,
+            share=share,
+            bias_interval=nothing,
+            low_interval=nothing,
+            high_interval=nothing,
+            slope=slope,
+            slope_interval=_around(nothing, slope, error, n - 2.0, "HC3, ", flat),
+            average=math.nan if reason else float(averages.mean()),
+            truth=truth,
+            kind=kind,
+            parts=((between, df), *parts),
+            within=within,
+            averages=averages,
+            differences=differences,
+            n_items=n,
+            n_measurements=tuple(int((~np.isnan(values)).sum()) for values in (x, y)),
+            reason=reason,
+        )
+    )
+    return _as_ratios(result) if kind == "ratio" else result
+
+
+def _values(data: Any, name: str, kind: _LimitsKind) -> Floats:
+    """Return a column as numbers, or as their logarithms."""
+    values = numbers(data[name], name)
+    is_wrong = (values <= 0.0) & (kind == "ratio")
+    refuse(
+        (
+            is_wrong.any(),
+            f"ratings: row {is_wrong.argmax()}, column {name!r}: needs a number above "
+            f"0, of which there are ratios, got {values[is_wrong.argmax()]:g}",
+        ),
+        error=RatingsError,
+    )
+    return np.log(values) if kind == "ratio" else values
+
+
+def _slope(averages: Floats, differences: Floats) -> tuple[float, float, str | None]:
+    """Return the slope of the line, its HC3 error, and why there is none."""
+    n = len(averages)
+    off = averages - averages.sum() / max(n, 1)
+    sum_of_squares = max(float(off @ off), 1e-300)
+    rest = 1.0 - 1.0 / max(n, 1) - off**2 / sum_of_squares  # 1 - h of [3]
+    reason = None
+    if n < 3:
+        reason = f"fewer than {max(n + 1, 2)} items were measured by both methods"
+    elif sum_of_squares <= _ROUNDING**2 * float(averages @ averages):
+        reason = "the mean of both methods is the same of all items"
+    elif rest.min() < _ROUNDING:
+        reason = "one item alone decides on the slope"
+    if reason is not None:
+        return math.nan, math.nan, reason
+    slope = float(off @ differences) / sum_of_squares
+    residuals = differences - differences.mean() - slope * off
+    # Σ x² e² / (1 - h)² over (Σ x²)²
+    return (
+        slope,
+        math.sqrt(float(((off * residuals / rest) ** 2).sum())) / sum_of_squares,
+        None,
+    )
+
+
+def _ended(limits: RepeatedLimits) -> RepeatedLimits:
+    """Return the limits about the bias, and the ends of them all."""
+    bias, sd, parts = limits.bias, limits.sd, list(limits.parts)
+    ends, (between, df) = limits.low_interval, parts[0]
+    z, quantile = (
+        NormalDist().inv_cdf(0.5 + 0.5 * of) for of in (limits.share, ends.level)
+    )
+    # the line turns about the mean of all, where other limits are told
+    centre = limits.averages.sum() / max(limits.n_items, 1)
+    sum_of_squares = max(float(((limits.averages - centre) ** 2).sum()), 1e-300)
+    lever = (
+        1.0 / max(limits.n_items, 1) + (limits.average - centre) ** 2 / sum_of_squares
+    )
+    error = math.sqrt(between * lever)
+    low, high, why = _variance_ends(parts, sd**2, ends.level)
+    # MOVER: squared distances of the bias's ends and of z sd's add up; the bias's are
+    # normal ones here, with which the limits held their level from 4 items on
+    near = math.hypot(quantile * error, z * (sd - math.sqrt(low)))
+    far = math.hypot(quantile * error, z * (math.sqrt(high) - sd))
+    lower, upper = bias - z * sd, bias + z * sd
+    ends = replace(ends, reason=limits.reason or why)
+    return replace(
+        limits,
+        low=lower,
+        high=upper,
+        bias_interval=_around(ends, bias, error, df, "", limits.reason),
+        low_interval=replace(ends, low=lower - far, high=lower + near),
+        high_interval=replace(ends, low=upper - near, high=upper + far),
+    )
+
+
+def _as_ratios(limits: RepeatedLimits) -> RepeatedLimits:
+    """Return limits of ratios for those of differences of logarithms."""
+    ratios: dict[str, Any] = {
+        name: math.exp(getattr(limits, name))
+        for name in ("bias", "low", "high", "average")
+    }
+    for name in ("bias_interval", "low_interval", "high_interval"):
+        of = getattr(limits, name)
+        ratios[name] = replace(of, low=math.exp(of.low), high=math.exp(of.high))
+    return replace(
+        limits,
+        **ratios,
+        averages=np.exp(limits.averages),
+        differences=np.exp(limits.differences),
+    )
+
+
+def _around(
+    ends: Interval, value: float, error: float, df: float, kind: str, reason: str | None
+) -> Interval:
+    """Return the interval by Student's t, in other things like one."""
+    from scipy.special import stdtrit  # loaded only for an interval
+
+    half = float(stdtrit(df, 0.5 + 0.5 * ends.level)) * error
+    return replace(
+        ends,
+        low=value - half,
+        high=value + half,
+        method=f"{kind}t({df:g})",
+        notes=(),
+        reason=reason,
+    )
+
+
+def _cells(codes: NDArray[np.intp], values: Floats, n_items: int) -> Floats:
+    """Return how often each item was measured, its mean, and squares about it."""
+    # -> (3, n_items)
+    there = ~np.isnan(values)
+    codes, values = codes[there], values[there]
+    n = np.bincount(codes, minlength=n_items).astype(np.float64)
+    # of floats: a sum of no values is one of whole numbers
+    means = divide(np.bincount(codes, values, n_items).astype(np.float64), n)
+    squares = np.bincount(codes, (values - means[codes]) ** 2, n_items)
+    return np.array([n, means, squares])
+
+
+def _within(cells: Floats) -> tuple[float, tuple[float, float]]:
+    """Return the variance within, and what of it single ones add, with its df."""
+    n, _, squares = cells
+    df = float(n.sum()) - len(n)
+    if not df:  # each was measured once
+        return math.nan, (0.0, 1.0)
+    variance = float(squares.sum()) / df
+    # all but 1/m is not in the means, m the harmonic mean of n
+    return variance, ((1.0 - float((1.0 / n).mean())) * variance, df)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimitsWithMean:
+    """How far a single measurement lies from the mean of several observers.
+
+    Attributes
+    ----------
+    limit : Estimate
+        How far on either side, z √((k − 1)/k) standard errors with k observers.
+    share : float
+        Of the measurements that are to lie between the limits.
+    sem, mdc : Estimate
+        Standard error of a single measurement, and 1.96 √2 of it: what chance exceeds
+        in 5 % of the differences of two single measurements of the same.
+    within : float
+        Variance of repeated measurements of an item by an observer; ``nan`` without.
+    averages, differences : ndarray, shape (n_places,)
+        Of each item and observer the mean of all observers, and the observer's own
+        mean less that.
+    n_measurements : int
+        Of all items by all observers.
+
+    Notes
+    -----
+    Each estimate has its interval, for other items and observers, or the reason why it
+    is undefined; its `n_raters` are the observers.
+    """
+
+    limit: Estimate
+    share: float
+    sem: Estimate
+    mdc: Estimate
+    within: float
+    averages: Floats = field(compare=False, repr=False)
+    differences: Floats = field(compare=False, repr=False)
+    n_measurements: int
+
+
+def limits_with_mean(
+    data: Any,
+    *,
+    item: str,
+    observers: Sequence[str],
+    share: float = 0.95,
+    level: float = 0.95,
+) -> LimitsWithMean:
+    """Estimate how far single measurements lie from the mean of several observers.
+
+    Parameters
+    ----------
+    data : DataFrame
+        One row a measurement of an item by some or all observers.
+    item : str
+        Name of the column of items.
+    observers : sequence of str
+        Names of the columns of what each observer measured; a number that is missing
+        was not measured.
+    share : float, optional
+        Of the measurements that are to lie between the limits.
+    level : float, optional
+        Level of the intervals.
+
+    Returns
+    -------
+    LimitsWithMean
+        The limits, and standard error of measurement and minimal detectable change of
+        the same variances, with intervals for other items and observers.
+
+    Raises
+    ------
+    RatingsError
+        If a column is not there or has no numbers, or an item has no name.
+    ParameterError
+        If the share or the level is not within (0, 1).
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there are fewer than two items or observers, or too few measurements to tell
+        observers from the rest.
+
+    Notes
+    -----
+    A measurement is item, observer and the rest, all normal. The variance of its error
+    is that of `sem`, of the items' means by each observer, and of repeats (1 − 1/m) of
+    the variance within, m their harmonic mean [2]_; from the mean of k observers a
+    measurement lies √((k − 1)/k) of that [1]_. All intervals are those of a sum of mean
+    squares (see `sem`).
+
+    References
+    ----------
+    .. [1] Christensen, H. S., Borgbjerg, J., Børty, L., Bøgsted, M. (2020). On Jones et
+       al.'s method for extending Bland-Altman plots to limits of agreement with the
+       mean for multiple observers. BMC Medical Research Methodology, 20, 304.
+       https://doi.org/10.1186/s12874-020-01182-w
+    .. [2] Christensen, H. S., Bøgsted, M., Borgbjerg, J. (2025). A statistical note on
+       extending Christensen's limits of agreement with the mean.
+       https://arxiv.org/abs/2508.16250
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> frame = pd.DataFrame({"item": [1, 2, 3], "a": [1, 3, 5], "b": [2, 3, 7],
+    ...                       "c": [2, 4, 6]})
+    >>> limits = limits_with_mean(frame, item="item", observers=["a", "b", "c"])
+    >>> print(f"±{limits.limit.value:.2f}, SEM {limits.sem.value:.2f}")
+    ±1.19, SEM 0.75
+    """
+    check_level(share, "share")
+    check_level(level)
+    check_frame(data, (item, *observers), "data")
+    codes, items = levels(data[item], item)
+    cells = [_cells(codes, numbers(data[of], of), len(items)) for of in observers]
+    rated = rated_part(np.array([of[1] for of in cells]).reshape(-1, len(items)).T)
+    # every item by every observer as if it were an item
+    repeats = np.concatenate([np.zeros((3, 0)), *cells], axis=1)
+    within, part = _within(repeats[:, repeats[0] > 0.0])
+    # [1]: of √((k - 1)/k) standard errors is a measurement from the mean of k observers
+    z, k = NormalDist().inv_cdf(0.5 + 0.5 * share), rated.shape[1]
+    factors = {
+        "sem": 1.0,
+        "mdc": _CHANGE,
+        "limit": z * math.sqrt(1.0 - 1.0 / max(k, 1)),
+    }
+    errors = {
+        name: _error(rated, name, factor, "agreement", None, level, [part])
+        for name, factor in factors.items()
+    }
+    centre = np.nanmean(rated, axis=1, keepdims=True) + 0.0 * rated
+    return LimitsWithMean(
+        **errors,
+        share=share,
+        within=within,
+        averages=centre[~np.isnan(centre)],
+        differences=(rated - centre)[~np.isnan(centre)],
+        n_measurements=int(repeats[0].sum()),
+    )
