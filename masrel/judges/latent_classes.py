@@ -16,9 +16,14 @@ from scipy.optimize import linear_sum_assignment
 
 from masrel._input import check_option, listed, refuse, shown, warn_caller
 from masrel.agreement import Label
-from masrel.agreement._engine import Floats, check_level, divide, undefined
-from masrel.agreement._labels import is_missing, label_codes
-from masrel.agreement._rows import Integers, coded, columns_of
+from masrel.agreement._engine import (
+    Floats,
+    Integers,
+    check_level,
+    divide,
+    undefined,
+)
+from masrel.agreement._labels import coded, columns_of, is_missing, label_codes
 from masrel.errors import RatingsError, SmallSampleWarning
 from masrel.intervals._question import recorded_generator, student_t, warn_small
 from masrel.intervals.jackknife import _variance_of

@@ -13,8 +13,15 @@ from scipy.special import expit
 
 from masrel._input import listed, refuse, shown
 from masrel.agreement import mcnemar
-from masrel.agreement._engine import NO_SPREAD, Floats, check_level, divide, undefined
-from masrel.agreement._rows import Integers, coded, columns_of
+from masrel.agreement._engine import (
+    NO_SPREAD,
+    Floats,
+    Integers,
+    check_level,
+    divide,
+    undefined,
+)
+from masrel.agreement._labels import coded, columns_of
 from masrel.errors import RatingsError
 from masrel.estimates import Significance
 from masrel.intervals._question import student_t, warn_small

@@ -1,7 +1,8 @@
 """Tools that annotate texts or evaluate models: who gave which item which grade.
 
-A function for each tool goes from a record of its export to `Annotation`s. Only grades
-of whole items are read; several of an item at once, spans and relations are refused.
+A function for each tool goes from a record of its export to `Annotation`s. As ratings
+only grades of whole items are read; several of an item at once, spans and relations are
+refused; but there are functions that give spans, and nothing else.
 """
 
 import re
@@ -304,6 +305,44 @@ def _mt_bench(_: str, row: _Record) -> Iterator[Annotation]:
         item = f"{question}/{'/'.join(sorted(sides))}/{turn}"
         grades = {"winner": None if winner == "error" else winner}
     yield Annotation(item, rater, grades, None, "", kind, question, note)
+
+
+# ---- spans: the grades are a label, and where it begins and ends ----
+
+
+def label_studio_spans(path: str, task: _Record) -> Iterator[Annotation]:
+    """Return regions of a text, in characters, or of a recording, in seconds."""
+    for annotator, annotation in zip(
+        _label_studio(path, task), task["annotations"], strict=True
+    ):
+        yield annotator._replace(grades={})  # who found nothing has looked, too
+        for result in annotation["result"]:
+            value = result.get("value", {})  # relations have none
+            place = value["globalOffsets"] if "startOffset" in value else value
+            for label in (
+                of for key in value if key.endswith("labels") for of in value[key]
+            ):
+                yield annotator._replace(
+                    grades={
+                        "label": label,
+                        "begin": place["start"],
+                        "end": place["end"],
+                        "length": result.get("original_length"),
+                    }
+                )
+
+
+def brat_spans(path: str, document: _Record) -> Iterator[Annotation]:
+    """Return the entities of an .ann file in a folder of its annotator."""
+    rater, item = path.split("/", 1)
+    annotator = Annotation(item, rater, {}, document["text"])
+    yield annotator
+    # of an entity in pieces each is a span
+    for label, places in re.findall(r"(?m)^T\d+\t(\S+) ([\d ;]+)", document["ann"]):
+        for begin, end in re.findall(r"(\d+) (\d+)", places):
+            yield annotator._replace(
+                grades={"label": label, "begin": begin, "end": end}
+            )
 
 
 # ---- the table ----

@@ -1,0 +1,117 @@
+"""``masrel spans``: whether observers mark the same parts of texts or recordings."""
+
+from collections import Counter
+from hashlib import sha256
+from pathlib import Path
+
+import click
+
+from masrel._input import refuse
+from masrel.cli._options import (
+    GroupedHelp,
+    OutputOptions,
+    call_text,
+    grouped,
+    output_options,
+    write_output,
+)
+from masrel.cli._paths import InputFile
+from masrel.ratings._findings import Reading
+
+
+@click.command("spans", cls=GroupedHelp)
+@click.argument("file", type=InputFile(exists=True, path_type=Path))
+@click.option("--document", metavar="COL", help="Column of the documents; one if none.")
+@click.option("--observer", metavar="COL", help="Column of the observers.")
+@click.option("--label", metavar="COL", help="Column of labels; empty: nothing found.")
+@click.option("--begin", metavar="COL", help="Column of where spans begin.")
+@click.option("--end", metavar="COL", help="Column of the first place behind them.")
+@click.option("--length", metavar="COL", help="Column of the lengths of documents.")
+@click.option("--text", metavar="COL", help="Column of texts, in place of lengths.")
+@grouped(
+    "reading",
+    Reading,
+    click.option("--delimiter", default="auto", metavar="CHAR", help="Separator."),
+    click.option("--encoding", metavar="NAME", help="Encoding of text."),
+    click.option("--sheet", metavar="NAME", help="Sheet of a workbook."),
+    click.option(
+        "--from",
+        "source",
+        type=click.Choice(["label-studio"]),
+        help="Tool whose export it is; a folder is brat's.",
+    ),
+)
+@click.option(
+    "--step",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="What places are counted in, such as 0.001 for seconds in milliseconds.",
+)
+@click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
+@click.option("--show", metavar="DOCUMENT", help="Draw it; else that of most spans.")
+@output_options(
+    json="Write the result here; - prints it, and nothing else, on stdout.",
+    figure="Draw the spans of a document into this .png, .svg or .pdf.",
+    html="Write a page here that needs no other file.",
+    csv="Print every digit as CSV.",
+    latex="Print a LaTeX table.",
+)
+def spans(
+    file: Path,
+    reading: Reading,
+    step: float | None,
+    level: float,
+    show: str | None,
+    output: OutputOptions,
+    **columns: str | None,
+) -> None:
+    """Say how far observers mark the same spans in FILE.
+
+    FILE is a table with a span a row, an export of Label Studio (--from), or a folder
+    of brat, with a folder of each annotator. Krippendorff's unitizing alpha is of all
+    observers together, F1 of every two.
+    """
+    from masrel.analysis._file_spans import span_answer
+    from masrel.pages._answer_page import spans_page
+    from masrel.plots._drawn_values import Drawn
+    from masrel.ratings._reader import read_spans
+    from masrel.tables._answer_tables import answer_documents, answer_table
+
+    rows, lengths, off = read_spans(file, reading, columns, step)
+    answer = span_answer(rows, lengths, off, level)
+    table = answer_table(
+        answer,
+        bands=None,
+        detail="brief",
+        items="documents",
+        in_sentences=False,
+        data="foreign",
+    )
+    n_spans = Counter(row[0] for row in rows if row[2])
+    chosen = show or max(n_spans, key=n_spans.__getitem__, default=None)
+    refuse(
+        (chosen not in n_spans, f"{file}: needs a document with spans, got {chosen}")
+    )
+    of_chosen = [row[1:] for row in rows if row[0] == chosen]
+    drawn = Drawn(
+        "masrel.plots._spans_figure:spans_picture",
+        (of_chosen, lengths.get(f"{chosen}"), chosen),
+    )
+    data = b"".join(of.read_bytes() for of in sorted(file.rglob("*.ann")) or [file])
+    digest = sha256(data).hexdigest()
+    write_output(
+        output,
+        document=lambda: {
+            "file": str(file),
+            "sha256": digest,
+            "options": {"step": step, "level": level, **reading.record(), **columns},
+            "notes": [*answer.notes],
+            "estimates": answer_documents(answer, None),
+        },
+        text=lambda: table,
+        figure=lambda: drawn,
+        html=lambda: spans_page(
+            table, drawn, {"Command": call_text(), f"SHA-256 of {file.name}": digest}
+        ),
+        notes=answer.notes,
+        width=88,
+    )
