@@ -1,8 +1,11 @@
 """How estimates were made, in sentences for a paper, written from what was computed."""
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from masrel.agreement import COEFFICIENTS
@@ -13,16 +16,100 @@ from masrel.analysis._file_estimates import (
     Row,
 )
 from masrel.estimates import Interval, _population
-from masrel.pages._references import (
-    cited,
-    coefficient_references,
-    interval_references,
-)
 from masrel.ratings import RatingsFile
+from masrel.scales import PublishedScale
 from masrel.tables._tables import counted, joined, number, percent
 
 if TYPE_CHECKING:
     from masrel.intervals import LatentTrait
+
+_FILE = Path(__file__).with_name("templates") / "references.bib"
+
+# Words in the method of an interval to what it rests on
+_METHODS = {
+    "jackknife": "efron1981",
+    "bootstrap": "efron1993",
+    "Dirichlet-multinomial": "mosimann1962",
+    "delta method": "gwet2014",
+}
+
+_SCALES = {
+    "modified-ashworth": ("bohannon1987",),
+    "ashworth": ("ashworth1964",),
+    "tardieu": ("gracies2010",),
+    "modified-tardieu": ("boyd1999",),
+    "updrs-rigidity": ("goetz2008",),
+}
+
+
+def coefficient_references(coefficient: str, weights: str) -> tuple[str, ...]:
+    """Return the keys of what a coefficient is cited for."""
+    if (entry := COEFFICIENTS.get(coefficient)) is None:  # kappa of a category
+        return ()
+    is_alpha = coefficient == "krippendorff_alpha"
+    is_of_kappa = entry.weighted and weights != "identity" and not is_alpha
+    return (*entry.references, "cohen1968") if is_of_kappa else entry.references
+
+
+def interval_references(interval: Interval) -> tuple[str, ...]:
+    """Return the keys of what the method of an interval is cited for."""
+    return tuple(key for words, key in _METHODS.items() if words in interval.method)
+
+
+def scale_references(scale: PublishedScale | None) -> tuple[str, ...]:
+    """Return the keys of what a scale is cited for, if it is one of the literature."""
+    return () if scale is None else _SCALES[scale.id]
+
+
+@cache
+def _entries() -> dict[str, str]:
+    # key -> entry as it stands in the file
+    text = _FILE.read_text(encoding="utf-8")
+    entries = (entry.strip() for entry in text.split("\n\n"))
+    return {entry.partition("{")[2].partition(",")[0]: entry for entry in entries}
+
+
+def bibtex(keys: Iterable[str]) -> str:
+    """Return entries as BibTeX, in the order of their keys."""
+    return "\n\n".join(_entries()[key] for key in sorted(set(keys)))
+
+
+def cited(keys: Iterable[str]) -> str:
+    """Return references in brackets with a space before them; nothing for none."""
+    names = "; ".join(map(_author_year, keys))
+    return f" ({names})" if names else ""
+
+
+@cache
+def _fields(key: str) -> dict[str, str]:
+    # of an entry, without the braces that keep capitals
+    fields = re.findall(r"^  (\w+) = \{(.*)\},?$", _entries()[key], re.M)
+    return {name: re.sub("[{}]", "", text) for name, text in fields}
+
+
+def _author_year(key: str) -> str:
+    fields = _fields(key)
+    surnames = [name.partition(",")[0] for name in fields["author"].split(" and ")]
+    if len(surnames) > 2 or surnames[-1] == "others":
+        return f"{surnames[0]} et al., {fields['year']}"
+    return f"{' & '.join(surnames)}, {fields['year']}"
+
+
+def reference_texts(keys: Iterable[str]) -> list[str]:
+    """Return references as a paper lists them."""
+    return sorted(map(_reference_text, set(keys)))
+
+
+def _reference_text(key: str) -> str:
+    fields = _fields(key)
+    authors = "; ".join(fields["author"].split(" and ")).replace("; others", " et al.")
+    where = fields.get("journal") or fields.get("booktitle") or fields["publisher"]
+    number = f"({fields['number']})" if "number" in fields else ""
+    parts = (where, f"{fields.get('volume', '')}{number}", fields.get("pages", ""))
+    listed = ", ".join(filter(None, parts)).replace("--", "–")
+    doi = f" https://doi.org/{fields['doi']}" if "doi" in fields else ""
+    return f"{authors} ({fields['year']}). {fields['title']}. {listed}.{doi}"
+
 
 _MOST_LISTED = 12  # grades that are named
 
@@ -39,7 +126,9 @@ def methods(
     used: list[str] = []
     by_name = {answer.name: answer for answer in answers}
     has_ends = questions.target is not None and not file.read.get("clusters")
-    names = dict.fromkeys((*by_name, *pictures))
+    # the picture of limits is of their own answer
+    drawn = {"limits": "bland_altman"}.get(questions.command)
+    names = dict.fromkeys((*by_name, *(of for of in pictures if of != drawn)))
     also = (
         (text, by_name[name].shown or [] if name in by_name else [])
         for name in names
@@ -77,6 +166,12 @@ _LIMITS = _Text(
     "differences; their intervals are exact for normal differences{}.",
     ("bland1999", "carkeet2015"),
 )
+_REPEATS = _Text(
+    "Limits of agreement are of single measurements: {} ± 1.96 standard deviations "
+    "made of the variances between and within items; their intervals combine those of "
+    "the parts (MOVER), that of the slope has HC3 errors{{}}.",
+    ("zou2013", "bland1999", "mackinnon1985"),
+)
 _WITHOUT = _Text(
     "What each rater adds is how the coefficient changes without the rater; its "
     "interval is by a jackknife over items{}.",
@@ -110,6 +205,22 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
         ),
     ),
     "limits_of_agreement": (_LIMITS,),
+    **{
+        name: (_REPEATS._replace(text=_REPEATS.text.format(middle)),)
+        for name, middle in (
+            ("limits_with_repeats", "the mean difference"),
+            ("limits_that_follow", "a line of differences over means"),
+            ("limits_of_ratios", "the mean of logarithms"),
+        )
+    },
+    "limits_with_mean": (
+        _Text(
+            "Limits of agreement with the mean of all raters, SEM and MDC95 were made "
+            "of the variances between raters and of the rest; their intervals are "
+            "those of a sum of mean squares{}.",
+            ("christensen2020", "graybill1980"),
+        ),
+    ),
     "bland_altman": (_LIMITS,),
     "differences": (
         _Text(

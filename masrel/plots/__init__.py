@@ -16,12 +16,11 @@ from masrel.plots._drawn_values import Drawn, Form
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from masrel.plots._components import components
     from masrel.plots._forest import forest
     from masrel.plots._grades import categories, confusion, grades, items
     from masrel.plots._latent_scale import latent
     from masrel.plots._limits_figure import bland_altman
-    from masrel.plots._rater_pairs import pairs
+    from masrel.plots._rater_pairs import components, pairs
     from masrel.plots._traces import traces
 
 __all__ = [

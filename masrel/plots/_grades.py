@@ -22,7 +22,7 @@ from masrel.agreement import CodedRatings, Label, code_ratings, item_disagreemen
 from masrel.agreement._codes import item_counts, pair_table
 from masrel.agreement._weights import category_values
 from masrel.intervals.diagnosis import Diagnosis, _names, _place
-from masrel.plots._cells import (
+from masrel.plots._rater_pairs import (
     LINE,
     cells,
     inches_of,

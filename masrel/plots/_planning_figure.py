@@ -36,7 +36,7 @@ def planning_figure(
     axes.set_xlabel(over)
     axes.set_ylabel(name.replace("_", " ").replace("half ", "half-"))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylim(0.0, 1.02 if name in ("power", "assurance") else None)
+    axes.set_ylim(0.0, 1.02 if name in ("power", "assurance", "reliability") else None)
     axes.grid(axis="y")
     figure.legend(loc="outside lower center", ncols=4, fontsize=8)
     return figure

@@ -1,25 +1,35 @@
-"""Agreement of every two raters as a heatmap, and what each rater adds beside it."""
+"""Every two raters as a heatmap of cells, what each adds, and parts of the variance."""
 
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+from unicodedata import east_asian_width
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import blended_transform_factory
 from numpy.typing import NDArray
 
-from masrel.agreement import COEFFICIENTS
-from masrel.plots._cells import cells
+from masrel.agreement import (
+    COEFFICIENTS,
+    Label,
+    VarianceComponents,
+    variance_components,
+)
 from masrel.plots._style import (
     BLACK,
     BLUE,
     DASHES,
     GREY,
+    ON_CELL,
+    ORANGE,
     PAGE,
+    VERMILLION,
     Picture,
     colour_bar,
     inches_from,
@@ -31,6 +41,170 @@ from masrel.tables._tables import number, percent
 
 if TYPE_CHECKING:
     from masrel.intervals import Diagnosis
+
+_PARTS = {"items": BLUE, "raters": ORANGE, "residual": "#999999"}
+
+
+def components(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw what the variance of a rating is made of: items, raters and residual.
+
+    Bars are shares of the three together, from 0 to 1 whatever the data; beside each
+    is its standard deviation in the unit of the ratings. The share of items is
+    ICC(A,1), unless mean squares estimate a variance as less than 0, which is said.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order: numbers count by value, text by rank. Needed for
+        text.
+    ax : Axes, optional
+        Where it is drawn; on a new figure of pyplot unless given.
+
+    Returns
+    -------
+    Axes
+        Those that it is drawn on.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = components([[1, 2], [3, 3], [5, 7]], ax=Figure().add_subplot())
+    >>> [round(float(bar.get_width()), 2) for bar in ax.patches]
+    [0.86, 0.06, 0.09]
+    """
+    parts = variance_components(ratings, categories=categories)
+    return shown(components_picture(parts), ax)
+
+
+def components_picture(parts: VarianceComponents) -> Picture:
+    """Return the variances as shares of their sum, with standard deviations."""
+    total = parts.items + parts.raters + parts.residual or math.nan
+    negative = " and ".join(parts.negative)
+    note = f"{negative}: less than 0 by mean squares, taken as 0"
+    if math.isnan(total):
+        note = f"undefined: {parts.reason or 'all ratings are alike'}"
+    elif not negative:
+        note = "the share of items is ICC(A,1)"
+    shares = {name: getattr(parts, name) / total for name in _PARTS}
+    texts = [
+        f"{number(share, 2)}, SD {number((share * total) ** 0.5, 2, in_units=True)}"
+        for share in shares.values()
+    ]
+    label = f"share of the variance of a rating, by {parts.method}\n{note}"
+
+    def draw(axes: Axes) -> None:
+        axes.barh(range(3), list(shares.values()), 0.62, color=list(_PARTS.values()))
+        axes.grid(axis="x")
+        rows_of_shares(axes, list(shares), texts, 0.3, label)
+
+    return Picture(5.6, 1.75, draw)
+
+
+LINE = 0.15
+"""Inches of a line of letters of 9 points."""
+
+_MANY = 20  # cells in a row or a column from which on lines between them are thin
+
+
+def cells(
+    axes: Axes,
+    values: NDArray[Any],
+    letters: NDArray[np.str_],
+    *,
+    framed: NDArray[Any] | None = None,
+    n_columns: int | None = None,
+    left: float = -0.5,
+    frame: str = VERMILLION,
+    **how: Any,
+) -> AxesImage:
+    """Draw a grid of cells; letters beyond them are grey."""
+    # values (n, m), coloured by `how`, or colours (n, m, 4), m a multiple of n_columns,
+    # which have gaps between them; letters, framed (n, m)
+    n, m = values.shape[:2]
+    across = m if n_columns is None else n_columns
+    right, step = left + across, across / m
+    drawn = axes.imshow(
+        values,
+        extent=(left, right, n - 0.5, -0.5),
+        aspect="auto",
+        interpolation="nearest",
+        **how,
+    )
+    axes.spines[:].set_visible(False)
+    width = 1.2 if max(n, m) <= _MANY else 0.4
+    axes.hlines(np.arange(0.5, n - 1.0), left, right, PAGE, linewidth=width)
+    axes.vlines(left + np.arange(1.0, across), -0.5, n - 0.5, PAGE, linewidth=width)
+    colours = drawn.to_rgba(values)
+    for (row, column), text in np.ndenumerate(letters):
+        x = left + (column + 0.5) * step
+        is_inside = row < n and column < m  # where no layout need make room
+        if text:
+            axes.text(
+                x, row, text, ha="center", va="center", fontsize=8,
+                color=letters_on(colours[row, column]) if is_inside else GREY,
+                in_layout=not is_inside,
+            )  # fmt: skip
+    for row, column in np.argwhere(np.zeros((n, m)) if framed is None else framed):
+        corner = left + column * step, row - 0.5
+        look: dict[str, Any] = {"edgecolor": frame, "linewidth": 1.2 * width}
+        axes.add_patch(Rectangle(corner, step, 1.0, fill=False, zorder=3.0, **look))
+    return drawn
+
+
+def letters_on(colour: Sequence[float] | NDArray[np.float64]) -> str:
+    """Return the colour of letters that can be read on one of red, green and blue."""
+    # by relative luminance, as WCAG 2 has it: above some 0.18 dark ones stand out more
+    parts = ((np.array(colour[:3]) + 0.055) / 1.055) ** 2.4
+    return ON_CELL[int(parts @ (0.2126, 0.7152, 0.0722) < 0.18)]
+
+
+def inches_of(text: str) -> float:
+    """Return how long a text is, in letters of 9 points, some of which are wide."""
+    return 0.075 * sum(1 + (east_asian_width(letter) in "WF") for letter in text)
+
+
+def room_of(names: Sequence[str]) -> float:
+    """Return the inches of names at the left of rows, or standing above columns."""
+    return 0.3 + max(map(inches_of, short_names(names)))
+
+
+def name_rows(axes: Axes, names: Sequence[str], cell: float) -> None:
+    """Name rows that are so many inches high, as many as have room."""
+    every = math.ceil(LINE / cell)
+    axes.set_yticks(range(0, len(names), every), short_names(names)[::every])
+    axes.tick_params(axis="y", length=0)
+
+
+def name_columns(
+    axes: Axes, names: Sequence[str], cell: float, places: Sequence[float]
+) -> None:
+    """Name columns that are so many inches wide, above them, upright where narrow."""
+    names = short_names(names)
+    is_narrow = max(map(inches_of, names)) + 0.06 > cell
+    every = math.ceil(LINE / cell) if is_narrow else 1
+    axes.set_xticks(places[::every], names[::every], rotation=90 * is_narrow)
+    axes.tick_params(axis="x", length=0)
+    axes.xaxis.tick_top()
+
+
+def rows_of_shares(
+    axes: Axes, names: Sequence[str], texts: Sequence[str], cell: float, label: str
+) -> None:
+    """Make axes of shares, a row a name, with a text at the right of each."""
+    axes.set(xlim=(0.0, 1.0), ylim=(len(names) - 0.5, -0.5), xlabel=label)
+    axes.spines["left"].set_visible(False)
+    name_rows(axes, names, cell)
+    place = blended_transform_factory(inches_from(axes, 1.0, 0.0), axes.transData)
+    for row, text in enumerate(texts if cell >= LINE else ()):
+        axes.text(0.08, row, text, transform=place, va="center", fontsize=8)
+
 
 _Floats = NDArray[np.float64]
 

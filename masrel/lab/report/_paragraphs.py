@@ -30,7 +30,7 @@ from masrel.lab.report._material import (
 from masrel.lab.report._order_tables import effect_rows
 from masrel.lab.run._state import FROM_PERSONS
 from masrel.lab.schedule._orders import orders_in_words
-from masrel.pages._references import (
+from masrel.pages._methods_text import (
     bibtex,
     cited,
     coefficient_references,
