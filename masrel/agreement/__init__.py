@@ -44,6 +44,13 @@ from masrel.agreement.change import (
     specific_agreement,
     stuart_maxwell,
 )
+from masrel.agreement.decision import (
+    DStudy,
+    cheapest_design,
+    d_study,
+    single_ratings,
+)
+from masrel.agreement.generalizability import GStudy, g_study
 from masrel.agreement.icc import (
     IccForm,
     VarianceComponents,
@@ -82,6 +89,18 @@ from masrel.agreement.pairs import (
     stratified_kappa,
 )
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
+from masrel.agreement.repeated_limits import (
+    LimitsWithMean,
+    RepeatedLimits,
+    limits_with_mean,
+    limits_with_repeats,
+)
+from masrel.agreement.spans import (
+    SpanMatch,
+    UnitizingAlpha,
+    span_f1,
+    unitizing_alpha,
+)
 from masrel.estimates import Significance
 
 __all__ = [
@@ -92,15 +111,21 @@ __all__ = [
     "CodedRatings",
     "Coefficient",
     "CountedRatings",
+    "DStudy",
     "Deletion",
     "ErrorKind",
+    "GStudy",
     "IccForm",
     "Label",
     "LimitsOfAgreement",
+    "LimitsWithMean",
     "McnemarKind",
     "Metric",
     "Property",
+    "RepeatedLimits",
     "Significance",
+    "SpanMatch",
+    "UnitizingAlpha",
     "VarianceComponents",
     "WeightName",
     "Weights",
@@ -113,6 +138,7 @@ __all__ = [
     "bowker",
     "brennan_prediger",
     "category_kappa",
+    "cheapest_design",
     "code_long",
     "code_ratings",
     "coefficient",
@@ -122,10 +148,12 @@ __all__ = [
     "count_items",
     "count_ratings",
     "count_table",
+    "d_study",
     "declared_weights",
     "equivalence_p_value",
     "fleiss_kappa",
     "fleiss_null",
+    "g_study",
     "gwet_ac",
     "holm",
     "icc",
@@ -137,6 +165,8 @@ __all__ = [
     "krippendorff_alpha",
     "light_kappa",
     "limits_of_agreement",
+    "limits_with_mean",
+    "limits_with_repeats",
     "lin_ccc",
     "mcnemar",
     "mdc",
@@ -147,9 +177,12 @@ __all__ = [
     "robinson_a",
     "scott_pi",
     "sem",
+    "single_ratings",
+    "span_f1",
     "specific_agreement",
     "stratified_kappa",
     "strength",
     "stuart_maxwell",
+    "unitizing_alpha",
     "variance_components",
 ]

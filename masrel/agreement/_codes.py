@@ -5,7 +5,7 @@ In: lists, arrays, frames, counts of items, or a table of two raters. Out:
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -399,20 +399,9 @@ def code_long(
     [[0, 1], [2, -1]]
     """
     check_option("repeated", repeated, get_args(Repeated))
-    is_frame = hasattr(frame, "columns") and hasattr(frame, "iloc")
-    got = f"got {type(frame).__name__}"
-    refuse((not is_frame, f"frame: needs a DataFrame, {got}"), error=RatingsError)
-    got = f"got {', '.join(map(repr, frame.columns))}"
-    refuse(
-        *(
-            (name not in frame.columns, f"ratings: needs a column {name!r}, {got}")
-            for name in (item, rater, grade)
-        ),
-        (not len(frame), f"{_NOTHING}, got no row"),
-        error=RatingsError,
-    )
-    items, item_names = _named(frame[item], item)
-    raters, rater_names = _named(frame[rater], rater)
+    check_frame(frame, (item, rater, grade))
+    items, item_names = levels(frame[item], item)
+    raters, rater_names = levels(frame[rater], rater)
     scale = None if categories is None else check_categories(categories)
     try:
         met, labels = frame[grade].factorize()
@@ -431,7 +420,38 @@ def code_long(
     )
 
 
-def _named(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
+def check_frame(frame: Any, columns: Iterable[str], name: str = "frame") -> None:
+    """Check that something is a DataFrame of a row or more that has these columns."""
+    if not hasattr(frame, "columns") or not hasattr(frame, "iloc"):
+        raise RatingsError(f"{name}: needs a DataFrame, got {type(frame).__name__}")
+    for column in columns:
+        if column not in frame.columns:
+            raise RatingsError(
+                f"ratings: needs a column {column!r}, got "
+                f"{', '.join(map(repr, frame.columns))}"
+            )
+    if not len(frame):
+        raise RatingsError(f"{_NOTHING}, got no row")
+
+
+def numbers(column: Any, name: str) -> NDArray[np.float64]:
+    """Return a column of a DataFrame as numbers; ``nan`` where there is none."""
+    try:
+        values = column.to_numpy(np.float64, na_value=np.nan)
+    except (TypeError, ValueError) as error:
+        raise RatingsError(
+            f"ratings: column {name!r} needs numbers: {error}"
+        ) from error
+    if np.isinf(values).any():
+        raise RatingsError(
+            f"ratings: row {np.isinf(values).argmax()}, column {name!r}: needs a "
+            "finite number, got infinity"
+        )
+    return np.asarray(values)
+
+
+def levels(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
+    """Return the level of each row of a column of a DataFrame, and their names."""
     places, names = column.factorize()
     where = f"ratings: row {np.argmin(places)}, column {name!r}"
     refuse((places.min() < 0, f"{where}: needs a name, got none"), error=RatingsError)

@@ -221,9 +221,14 @@ def _show_answers(
         (
             output.figure is not None and not has_figure,
             "--figure: shows intervals, so it needs --target raters, items or both",
-        )
+        ),
+        (
+            questions.truth and reading.repeated != "error",
+            f"--truth: takes every repeat, and --repeated {reading.repeated} does not",
+        ),
     )
     judging = questions.judging
+    reading = replace(reading, repeated="each") if questions.truth else reading
     if judging is not None:  # of a stream nobody knows which item is which
         both = judging.order is not None and reading.by is not None
         refuse((both, "--order, --by: needed one of them, got both"))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import progress, split_commas
+from masrel.cli._options import Decorator, progress, split_commas
 from masrel.cli._paths import InputFile
 from masrel.ratings._findings import Reading
 
@@ -165,3 +165,12 @@ table_options = [
     ),
 ]
 """Options of verbs that need not know who rated what."""
+
+
+def options_of(*names: str) -> list[Decorator]:
+    """Return the options of reading a file that set these."""
+    made = {
+        click.command()(option(lambda: None)).params[0].name: option
+        for option in reading_options
+    }
+    return [made[name] for name in names]

@@ -30,7 +30,7 @@ _NOT_OF_STUDIES = (  # what a protocol says
 )
 
 
-def _floats(text: str, number: type = float) -> list[Any]:
+def floats(text: str, number: type = float) -> list[Any]:
     """Return numbers separated by commas, or first:last:step."""
     try:
         numbers = [number(part) for part in re.split("[,:]", text)]
@@ -45,13 +45,14 @@ def _floats(text: str, number: type = float) -> list[Any]:
     return numbers
 
 
-def _whole_numbers(text: str) -> list[int]:
-    return _floats(text, int)
+def whole_numbers(text: str) -> list[int]:
+    """Return the same, if they are whole."""
+    return floats(text, int)
 
 
 def _prevalences(text: str) -> list[Any]:
     """Return shares of categories, several of them, or the rows of a table."""
-    rows = [_floats(row) for row in text.split(";")]
+    rows = [floats(row) for row in text.split(";")]
     return rows if len(rows) > 1 else rows[0]
 
 
@@ -71,19 +72,19 @@ _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
     "are arguments.",
 )
 @click.option(
-    "--value", type=_floats, metavar="NUMBERS", help="True coefficient, or several."
+    "--value", type=floats, metavar="NUMBERS", help="True coefficient, or several."
 )
 @click.option(
     "--items",
     "n_items",
-    type=_whole_numbers,
+    type=whole_numbers,
     metavar="NUMBERS",
     help="How many, as 30, 20,40 or 20:60:10.",
 )
 @click.option(
     "--raters",
     "n_raters",
-    type=_whole_numbers,
+    type=whole_numbers,
     metavar="NUMBERS",
     help="The same. One of both is solved for where it is left out; with --prices both "
     "are.",
@@ -122,7 +123,7 @@ _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
 @click.option("--max-cost", type=float, help="What the study may cost.")
 @click.option(
     "--prices",
-    type=_floats,
+    type=floats,
     metavar="NUMBERS",
     help="Of an item, a rater, a rating.  [default: 0,0,1]",
 )

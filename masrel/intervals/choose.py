@@ -357,13 +357,13 @@ def _outside_commonest(problem: IntervalProblem) -> tuple[int, bool]:
 def _posterior(problem: IntervalProblem, model: _Model) -> Interval | None:
     """Compute the posterior, one-sided where the estimate is perfect or undefined."""
     # imported here: they load scipy
-    from masrel.intervals._rho import DEFAULT_PRIOR, extended, rho_interval
-    from masrel.intervals._two_raters import table_interval, table_refusal
-    from masrel.intervals.posterior import (
+    from masrel.intervals._dirichlet import (
         alike_interval,
         no_posterior,
         patterns_interval,
     )
+    from masrel.intervals._rho import DEFAULT_PRIOR, extended, rho_interval
+    from masrel.intervals._two_raters import table_interval, table_refusal
 
     if no_posterior(problem):
         return None

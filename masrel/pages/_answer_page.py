@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from masrel.analysis._file_estimates import Answer, Questions
 from masrel.errors import MasrelWarning
-from masrel.pages._methods_text import latent_methods, methods
+from masrel.pages._methods_text import latent_methods, methods, reference_texts
 from masrel.pages._pictures import (
     PICTURES,
     PartSeen,
@@ -23,7 +23,6 @@ from masrel.pages._pictures import (
     judge_drawings,
     parts_seen,
 )
-from masrel.pages._references import reference_texts
 from masrel.pages._sections import (
     Content,
     Document,
@@ -298,4 +297,59 @@ def latent_page(
             _methods_section(*latent_methods(file, result)),
         ],
         {"Command": call, "Seed": str(result.seed)},
+    )
+
+
+def spans_page(table: Table, drawn: Drawn, inputs: Mapping[str, str]) -> str:
+    """Return the page of agreement on the spans in a file, whose table is given."""
+    text = f"The spans of each observer in {drawn.arguments[-1]}, label by label."
+    drawing = Drawing(name="spans", caption=text, alt=text, content=drawn, stamp="")
+    return html_page(
+        Document(
+            title="Agreement on spans",
+            tag="",
+            banner="",
+            provenance="",
+            result="",
+            sections=chapters(
+                [Section(name="result", title="Result", blocks=(table, drawing))],
+                drawn_block,
+            ),
+            inputs=tuple(inputs.items()),
+            version=version("masrel"),
+        )
+    )
+
+
+def study_page(
+    tables: Sequence[Table], curves: Drawn, inputs: Mapping[str, str]
+) -> str:
+    """Return the page of a generalizability study: its tables and its curves."""
+    first, *more = tables
+    stamp = SIMULATED if "simulated" in first.data else ""
+    drawing = Drawing(
+        name="reliability",
+        caption="Dependability Φ of means over so many levels.",
+        alt="Curves that rise with the number of levels; the table has their numbers.",
+        content=curves,
+        stamp="",
+    )
+    table = replace(first, caption="Components of variance", read=())
+    texts = (first.read[0], *reference_texts(["brennan2001"]))
+    paper = [Paragraph(text=text) for text in texts]
+    sections = [
+        Section(name="result", title="Result", blocks=(table, drawing, *more)),
+        Section(name="methods", title="Methods, to paste", blocks=(*paper,)),
+    ]
+    return html_page(
+        Document(
+            title="Generalizability study",
+            tag=tag_of(first.data),
+            banner=stamp,
+            provenance=first.read[0],
+            result=first.notes[0],
+            sections=chapters(sections, partial(drawn_block, stamp=stamp)),
+            inputs=tuple(inputs.items()),
+            version=version("masrel"),
+        )
     )

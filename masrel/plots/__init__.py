@@ -40,7 +40,7 @@ __all__ = [
 _HOMES = {
     "bland_altman": "_limits_figure",
     "categories": "_grades",
-    "components": "_components",
+    "components": "_rater_pairs",
     "confusion": "_grades",
     "forest": "_forest",
     "grades": "_grades",

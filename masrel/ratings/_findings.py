@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from masrel._input import refuse
 from masrel.errors import RatingsError
 
-Repeated = Literal["error", "first", "last", "mean"]
+Repeated = Literal["error", "first", "last", "mean", "each"]
 """What becomes of a second grade of an item by the same rater."""
 
 USUAL_MISSING = ("", "NA")
@@ -54,8 +54,9 @@ class Reading:
         sites: one of each item.
     frequency : str or None
         Column that says how many items each row of a wide table stands for.
-    repeated : {"error", "first", "last", "mean"}
-        What becomes of a second grade of an item by the same rater.
+    repeated : {"error", "first", "last", "mean", "each"}
+        What becomes of a second grade of an item by the same rater; each is kept for
+        limits of agreement alone, those of all sessions as repeats.
     categories : sequence of str or None
         Every grade of the scale, in order; the grades met unless given.
     missing_codes : sequence of str
@@ -200,7 +201,8 @@ class Reading:
             ),
             (
                 self.repeated not in get_args(Repeated),
-                f"--repeated: needed error, first, last or mean, got {self.repeated!r}",
+                f"--repeated: needed one of {', '.join(get_args(Repeated))}, got "
+                f"{self.repeated!r}",
             ),
             (
                 self.stream and self.whole,
@@ -409,6 +411,12 @@ _TEXTS = {
     "several labels": "item {item}: needed one category of each annotator, {rater} "
     "gave several, {got}, which are not read",
     "no rating": "needed ratings of {field}, got none",
+    "no role": "needed a column of the {role}, which --{role} names, got {columns}",
+    "no spans": "needed spans that begin and end at numbers: in a table, in an export "
+    "of Label Studio as JSON, or in a folder that has a folder of .ann files of each "
+    "annotator ({error})",
+    "no step": "needed whole numbers of where spans begin and end; --step 0.001 counts "
+    "seconds in milliseconds",
     "xpt": "is damaged, or no .xpt file (needed lines of 80 bytes)",
     # columns
     "no column": "{option}: there is no column {column!r}; there are {columns}{hint}",
@@ -420,8 +428,10 @@ _TEXTS = {
     "they are items, --transpose{hint}",
     "no rater": "{where}: needed columns of raters, or of categories, got none",
     "span columns": "{begin!r} and {end!r} look like where spans begin and end, parts "
-    "of a text or a recording, which are not read; --item names the items, if all "
-    "raters have the same ones",
+    "of a text or a recording, which masrel spans reads; --item names the items, if "
+    "all raters have the same ones",
+    "facets of text": "needed numbers, or --categories with every grade in order, got "
+    "text",
     "unnamed": "needed the {role}, got {got!r}{hint}",
     "no value": "needed a value",
     "contingency": "rows and columns have the same names, so that this looks like a "
@@ -522,7 +532,7 @@ _TEXTS = {
     # ratings
     "twice": "{rows}: {rater!r} graded {item!r} more than once: --by or --session "
     "names a column that tells such ratings apart, --repeated first, last or "
-    "mean keeps one{guess}",
+    "mean keeps one; limits of agreement can take all{guess}",
     "means": "--repeated mean: needs grades that are numbers without a declared scale, "
     "got {grades}; --repeated first or last keeps one",
     "two clusters": "{rows}: needed one cluster of item {item!r} in column {column!r}, "

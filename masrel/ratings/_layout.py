@@ -97,7 +97,7 @@ class Layout:
 def find_layout(sheet: Sheet, options: Reading) -> Layout:
     """Decide which column is what, or say which option would."""
     named = {
-        option: _columns_of(sheet, option, getattr(options, option))
+        option: columns_of(sheet, option, getattr(options, option))
         for option in _NAMED
         if getattr(options, option)
         if not (option == "raters" and options.by_criterion)  # parts of names
@@ -153,7 +153,7 @@ def _refuse_names(sheet: Sheet, used: set[int]) -> None:
             )
 
 
-def _columns_of(
+def columns_of(
     sheet: Sheet, option: str, values: str | Sequence[str]
 ) -> tuple[int, ...]:
     # the columns that an option names: one, or several between commas or one a value

@@ -9,14 +9,18 @@ the texts of all that is refused or warned of.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from fractions import Fraction
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from masrel._input import USUAL_NAMES
 from masrel.agreement import (
     CodedRatings,
     CountedRatings,
@@ -37,6 +41,7 @@ from masrel.ratings._doubts import (
 from masrel.ratings._findings import (
     Finding,
     Reading,
+    listed,
     refusal,
 )
 from masrel.ratings._grade_texts import (
@@ -49,6 +54,7 @@ from masrel.ratings._grade_texts import (
 )
 from masrel.ratings._layout import (
     Layout,
+    columns_of,
     find_layout,
     named,
     rated_twice,
@@ -71,6 +77,7 @@ from masrel.ratings._sheet import (
     refuse_html,
     unpacked,
 )
+from masrel.ratings._tools import Annotation, brat_spans, label_studio_spans
 from masrel.scales import Scale
 
 if TYPE_CHECKING:
@@ -204,6 +211,33 @@ def read_ratings(
     report = progress or (lambda *_: None)
     streamed = _streamed(path, options, report) if is_large else None
     return streamed or _read_cells(_read_sheet(path, options), options)
+
+
+@long_cells()
+def read_facets(
+    path: Path, facets: Sequence[str], reading: Reading
+) -> tuple[Sheet, dict[str, Any]]:
+    """Return a long table, and its columns of items, of facets and of numbers."""
+    sheet = without_second_header(_read_sheet(path, reading))
+    if not len(sheet.numbers):
+        raise sheet.refuse("no rows", sheet.at(0))
+    places = columns_of(sheet, "facets", facets)
+    first, *others = (sheet.header[place] for place in places)
+    aside = replace(reading, rater=first, ignore=(*reading.ignore, *others))
+    layout = find_layout(sheet, aside)
+    reading = with_order(sheet, layout.grades, reading)
+    grades = graded(sheet, layout.grades, reading)
+    if grades.scale.name == "observed" and not is_number(grades.scale.grades[0]):
+        raise sheet.refuse("facets of text", sheet.at(0), layout.grades[0])
+    values = np.array([*grades.scale.values, np.nan])[grades.codes.ravel()]
+    columns: dict[str, Any] = {
+        " ".join(sheet.header[k] for k in layout.item): layout.item
+    }
+    columns |= {sheet.header[place]: [place] for place in places}
+    for name, of in columns.items():
+        column = named(sheet, "item" if of is layout.item else "facet", of)
+        columns[name] = np.array(column.texts, dtype=object)[column.codes]
+    return sheet, {**columns, sheet.header[layout.grades[0]]: values}
 
 
 def _read_cells(sheet: Sheet, options: Reading) -> RatingsFile:
@@ -407,7 +441,7 @@ def _rated(
 ) -> RatingsFile:
     # a long or a wide table
     n_rows, n_raters = len(sheet.numbers), len(layout.raters)
-    row = np.arange(n_rows)
+    keeps_each, row = options.repeated == "each", np.arange(n_rows)
     item = named(sheet, "item", layout.item)
     grades = _graded(sheet, layout, options)
     codes = grades.codes.ravel()
@@ -424,7 +458,9 @@ def _rated(
         )
         row = np.repeat(row, n_raters)
     findings += doubt_names("raters", rater.texts) + doubt_item_names(sheet, item)
-    part, names_of_parts = _parts(sheet, layout)
+    # sessions are no parts where they are repeats
+    of_parts = replace(layout, session=None) if keeps_each else layout
+    part, names_of_parts = _parts(sheet, of_parts)
     part = part[row]
     if layout.criteria:
         criterion = Column.of(np.arange(n_raters), [of for of, _ in layout.criteria])
@@ -438,6 +474,8 @@ def _rated(
     findings += doubt_names("groups", groups)
     # part, item, rater, grade and row of each rating
     ratings = [part, item.codes[row], rater.codes, codes, row]
+    if keeps_each:
+        ratings[1], item = _each(sheet, layout, ratings, item)
     once, scale = _one_each(sheet, layout, options, ratings, item, rater, grades.scale)
     parts = []
     for k, of in enumerate(names_of_parts):
@@ -470,11 +508,11 @@ def _rated(
         np.bincount(once[3] + 1, minlength=len(scale.grades) + 1)[1:],
         findings,
         raters=Column(once[2], rater.texts).rows(slice(None)).texts,
-        n_items=len(item.texts),
+        n_items=len({*item.texts}),
         n_raters=len(rater.texts),
         n_missing=int((codes < 0).sum()),
         n_repeated=n_repeated,
-        repeated=options.repeated if n_repeated else None,
+        repeated=options.repeated if n_repeated or keeps_each else None,
         **facts,
     )
 
@@ -491,6 +529,26 @@ def _parts(sheet: Sheet, layout: Layout) -> tuple[Codes, list[dict[str, str]]]:
         return np.zeros(len(sheet.numbers), dtype=np.int64), [{}]
     codes, names = together([sheet.columns[place] for place in places.values()])
     return codes, [dict(zip(places, texts, strict=True)) for texts in names]
+
+
+def _each(
+    sheet: Sheet, layout: Layout, ratings: list[Codes], item: Column
+) -> tuple[Codes, Column]:
+    # an item of the same name for every time that one was rated, in its session
+    part, items, raters, _, row = ratings
+    session = (
+        0 * row if layout.session is None else sheet.columns[layout.session].codes[row]
+    )
+    of_key = np.unique(
+        np.column_stack([part, items, session, raters]), axis=0, return_inverse=True
+    )[1].ravel()
+    order = np.argsort(of_key, kind="stable")
+    time = np.argsort(order) - np.searchsorted(of_key[order], of_key)
+    keys, codes = np.unique(
+        np.column_stack([items, session, time]), axis=0, return_inverse=True
+    )
+    texts = [item.texts[k] for k in keys[:, 0].tolist()]
+    return codes.ravel(), Column(codes.ravel(), texts)
 
 
 def _one_each(
@@ -763,4 +821,101 @@ def read_weights(
             names or sheet.header,
         ),
         name=path.name,
+    )
+
+
+# ---- spans ----
+
+# What columns are called, letter case and signs between words aside.
+_OF_SPANS = {
+    "label": ("label", "category", "type", "tag", "class", "code", "entity"),
+    "observer": (*USUAL_NAMES["rater"], "user", "username"),
+    "begin": ("begin", "start", "start_offset", "begin_offset", "onset", "start_char"),
+    "end": ("end", "stop", "end_offset", "offset", "end_char"),
+    "document": (
+        *("document", "document_id", "doc", "doc_id", "file", "filename", "file_name"),
+        *("text_id", "recording", *USUAL_NAMES["item"]),
+    ),
+    "length": ("document_length", "text_length", "recording_length"),
+    "text": ("document_text",),
+}
+
+
+def read_spans(
+    path: Path, options: Reading, columns: Mapping[str, Any], step: float | None
+) -> tuple[list[tuple[Any, ...]], dict[str, int], float]:
+    """Return rows of spans, known lengths of documents, and the largest rounding."""
+    # columns: what those of a table are called, by their role; step: what places are
+    # counted in and rounded to; -> rows of document, observer, label, begin, length
+    steps = cache(lambda text: Fraction(text) / Fraction(str(step or 1)))
+    rows, lengths, off = list[tuple[Any, ...]](), Counter[str](), Fraction()
+    annotations = _spans(path, options, columns)
+    try:
+        for of in annotations:
+            document, span = str(of.item), of.grades
+            text = of.text if step is None and isinstance(of.text, str) else ""
+            length = -(-steps(str(span.get("length") or len(text))) // 1)
+            lengths[document] = max(lengths[document], length)
+            exact = [steps(str(span.get(end, 0))) for end in ("begin", "end")]
+            off = max(off, *(abs(place - round(place)) for place in exact))
+            who, (begin, end) = (document, str(of.rater)), map(round, exact)
+            rows.append((*who, span.get("label"), begin, end - begin))
+    except (TypeError, AttributeError, LookupError, ValueError) as error:
+        raise refusal(str(path), "no spans", error=error) from error
+    if step is None and off:
+        raise refusal(str(path), "no step")
+    return rows, {of: n for of, n in lengths.items() if n}, float(off)
+
+
+def _spans(
+    path: Path, options: Reading, columns: Mapping[str, Any]
+) -> Iterator[Annotation]:
+    # each is made of its record when it is asked for
+    if path.is_dir():
+        return (of for at, file in _brat_files(path) for of in brat_spans(at, file))
+    if options.source is None:
+        return _spans_of_table(path, options, columns)
+    from masrel.ratings._exports import _records  # with pandas
+
+    return (
+        of
+        for at, task in [*_records(str(path), path.suffix, bytes_of(path), "")]
+        for of in label_studio_spans(at, task)
+        if not of.why
+    )
+
+
+def _brat_files(folder: Path) -> Iterator[tuple[str, dict[str, str]]]:
+    # by folders of annotators; the text is beside each, or once for all
+    for file in sorted(folder.rglob("*.ann")):
+        place = file.relative_to(folder).with_suffix(".txt")
+        texts = file, folder / place, folder.joinpath(*place.parts[1:])
+        parts = [of.read_bytes().decode() for of in texts if of.is_file()]
+        yield (
+            place.with_suffix("").as_posix(),
+            {"ann": parts[0], "text": "".join(parts[1:2])},
+        )
+
+
+def _spans_of_table(
+    path: Path, options: Reading, columns: Mapping[str, Any]
+) -> Iterator[Annotation]:
+    sheet, cells = _read_sheet(path, options), dict[str, list[str]]()
+    names = {re.sub(r"\W+", "_", name.casefold()): name for name in sheet.header}
+    for role, usual in _OF_SPANS.items():
+        name = columns[role] or next(filter(None, map(names.get, usual)), None)
+        if name is not None:
+            cells[role] = sheet.columns[columns_of(sheet, role, name)[0]].cells()
+        elif role in ("label", "observer", "begin", "end"):
+            raise sheet.refuse("no role", role=role, columns=listed(sheet.header, 12))
+    cells.setdefault("document", [path.stem] * len(sheet.numbers))
+    return (
+        # a row without a label says that somebody looked
+        Annotation(
+            *(row["document"], row["observer"]),
+            row if row["label"] else {"length": row.get("length")},
+            row.get("text"),
+        )
+        for of in zip(*cells.values(), strict=True)
+        for row in [dict(zip(cells, of, strict=True))]
     )

@@ -66,13 +66,14 @@ def test_no_module_imports_in_a_circle() -> None:
 
 
 # Fewer is better: 60 and 85 were aimed at before commands drew pictures of ratings and
-# wrote pages, which are modules of their own. A higher number needs a reason.
+# wrote pages, which are modules of their own. A higher number needs a reason: limits
+# with repeats and spans are subjects, and so modules, of their own.
 @pytest.mark.parametrize(
     ("commands", "at_most"),
     [
-        (("agree",), 80),
+        (("agree",), 83),
         # one of them is masrel.agree, which stands beside the version
-        (("agree", "compare", "diagnose", "limits", "latent", "plan", "audit"), 99),
+        (("agree", "compare", "diagnose", "limits", "latent", "plan", "audit"), 102),
     ],
 )
 def test_a_command_reaches_few_modules(commands: tuple[str, ...], at_most: int) -> None:

@@ -709,10 +709,7 @@ TABLE: dict[str, Asked] = {
         options="--coefficients bland_altman",
         text=CHANGES,
         tries={
-            "masrel limits": Asked(
-                code=None,
-                tries={"--raters Kim,Lee": {"limits_of_agreement 0 mean": -1 / 4}},
-            )
+            "masrel limits": {"limits_with_mean 0 n_measurements": 12.0},
         },
     ),
     "clusters": Asked(
@@ -733,6 +730,8 @@ TABLE: dict[str, Asked] = {
 NO_ROW = {
     "unpacked": "says to unpack the file, and names no option",
     "zstd": "names a command of another program",
+    "no step": "is of spans; tests/cli/test_spans.py does what it says",
+    "facets of text": "is of facets; tests/cli/test_gstudy.py does what it says",
 }
 
 

@@ -1,0 +1,167 @@
+"""``masrel gstudy``: variance of persons and facets, and the reliability of designs."""
+
+from itertools import product
+from pathlib import Path
+from typing import Any, Literal
+from warnings import catch_warnings
+
+import click
+
+from masrel._input import listed, refuse
+from masrel.cli._options import (
+    GroupedHelp,
+    OutputOptions,
+    call_text,
+    grouped,
+    output_options,
+    split_commas,
+    write_output,
+)
+from masrel.cli._paths import InputFile
+from masrel.cli._reading import options_of
+from masrel.cli.plan import floats, whole_numbers
+from masrel.errors import MasrelWarning
+from masrel.ratings._findings import Reading
+
+# Numbers of levels of each facet whose designs are shown unless some are asked for
+_LEVELS = ((1, 2, 3, 4, 6, 8), (1, 2, 4), (1, 2))
+
+
+@click.command("gstudy", cls=GroupedHelp)
+@click.argument("file", type=InputFile(path_type=Path))
+@click.option(
+    "--facets",
+    type=split_commas,
+    required=True,
+    metavar="COL,…",
+    help="Columns of one to three conditions of measurement, such as rater,occasion.",
+)
+@click.option(
+    "--nested",
+    multiple=True,
+    metavar="FACET:COL",
+    help="A facet whose levels lie within those of another, as rater:task.",
+)
+@click.option(
+    "--fixed",
+    multiple=True,
+    metavar="COL",
+    help="A facet whose levels are all there are; of others they are a sample.",
+)
+@click.option(
+    "--cut", type=float, help="A grade at which persons are told apart, for Φ(λ)."
+)
+@click.option(
+    "--for",
+    "sizes",
+    type=whole_numbers,
+    multiple=True,
+    metavar="N,…",
+    help="A design: levels of each facet, in their order; several times for several.",
+)
+@click.option("--aim", type=float, help="Seek the cheapest design that has this Φ.")
+@click.option(
+    "--seek",
+    type=click.Choice(["dependability", "generalizability"]),
+    default="dependability",
+    show_default=True,
+    help="What the aim is for: Φ, or Eρ², where persons are only compared.",
+)
+@click.option(
+    "--cost",
+    "prices",
+    type=floats,
+    metavar="N,…",
+    help="Prices: of a level of each facet, in their order, and of a rating.  "
+    "[default: 0,…,1]",
+)
+@click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
+@click.option("--seed", "rng", default=0, show_default=True, help="Seed of draws.")
+@grouped(
+    "reading",
+    Reading,
+    *options_of("item", "grade", "no_header", "skip", "header", "categories"),
+    *options_of("missing_codes", "decimal", "thousands", "units", "delimiter"),
+    *options_of("encoding", "sheet"),
+)
+@output_options(
+    json="Write every number here; - prints them, and nothing else, on stdout.",
+    figure="Draw reliability over numbers of levels into this .png, .svg or .pdf.",
+    html="Write a page here that needs no other file.",
+    csv="Print every digit as CSV.",
+    latex="Print LaTeX tables.",
+)
+def gstudy(
+    file: Path,
+    facets: list[str],
+    nested: tuple[str, ...],
+    fixed: tuple[str, ...],
+    cut: float | None,
+    sizes: tuple[list[int], ...],
+    aim: float | None,
+    seek: Literal["dependability", "generalizability"],
+    prices: list[float] | None,
+    reading: Reading,
+    output: OutputOptions,
+    **of_intervals: Any,
+) -> None:
+    """Say where the variance of the ratings in FILE lies, and what would be reliable.
+
+    FILE has one row a rating, with columns for what is measured (--item), for facets
+    and for grades. Components of variance with intervals, the reliability of designs
+    with other numbers of levels, and of single ratings: of the same rater, say, and of
+    different ones.
+    """
+    refuse(
+        (
+            any(len(n) != len(facets) for n in sizes),
+            f"--for: needs one number for each of {listed(facets)}, got {[*sizes]}",
+        ),
+        (prices and aim is None, "--cost: needs --aim, for which a design is sought"),
+    )
+    # imported here: they load slowly, and a call that is refused needs none of them
+    from pandas import DataFrame
+
+    from masrel.agreement import cheapest_design, d_study, g_study
+    from masrel.pages._answer_page import study_page
+    from masrel.ratings._reader import read_facets
+    from masrel.tables._decision_tables import study_curves, study_tables
+    from masrel.tables._tables import SIMULATED
+
+    sheet, columns = read_facets(file, facets, reading)
+    of, *_, grade = columns
+    within = dict(pair.partition(":")[::2] for pair in nested)
+    study = g_study(
+        DataFrame(columns),
+        of=of,
+        facets=facets,
+        nested=within,
+        fixed=fixed,
+        grade=grade,
+        **of_intervals,
+    )
+    levels = [
+        [study.n_within(name)] if name in fixed else steps
+        for name, steps in zip(facets, _LEVELS, strict=False)
+    ]
+    with catch_warnings(action="ignore", category=MasrelWarning):  # tables say it
+        designs = [
+            d_study(study, dict(zip(facets, n, strict=True)), cut=cut)
+            for n in sizes or product(*levels)
+        ]
+        if aim is not None:
+            designs.append(cheapest_design(study, aim, prices=prices, of=seek))
+        data = "simulated" if sheet.is_simulated else "foreign"
+        shown, document = study_tables(study, designs, file=sheet.name, data=data)
+        curves = study_curves(study, aim)
+    inputs = {"Command": call_text(), f"SHA-256 of {file.name}": sheet.sha256()}
+    write_output(
+        output,
+        document=lambda: {"inputs": inputs, **document},
+        text=lambda: shown[0],
+        more=shown[1:],
+        figure=lambda: curves,
+        html=lambda: study_page(shown, curves, inputs),
+        stamp=SIMULATED if sheet.is_simulated else "",
+        notes=(*shown[0].read, *shown[0].notes),
+    )
