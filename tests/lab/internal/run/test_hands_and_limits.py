@@ -33,7 +33,7 @@ from masrel.lab.protocol import (
 )
 from masrel.lab.recording import RECORDING_COLUMNS, Recording, stretches
 from masrel.lab.run import GradeRequest, SimulatedGrades
-from masrel.lab.run._present import _felt
+from masrel.lab.run._present import StatusOfHand, _felt
 from masrel.lab.run._settings import (
     _largest_torque,
     backend_options,
@@ -385,3 +385,14 @@ def test_a_retest_can_repeat_everything_or_nothing(
         for s in ("test", "retest")
     )
     assert (first == second) is equal
+
+
+def test_a_hand_that_holds_is_done_when_it_brings_the_arm_back_at_last() -> None:
+    status = StatusOfHand(2, holds=True)
+    for n_over in (1, 2):
+        status.is_armed = True
+        status.is_armed = False
+        status.n_stretches = n_over
+        assert not status.is_done
+    status.is_armed = True
+    assert status.is_done
