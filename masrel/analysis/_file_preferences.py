@@ -27,22 +27,29 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
     """Return how far order decides what each judge prefers, and how strongly."""
     verdicts, tie = _verdicts(file)
     judges = questions.judging.judges if questions.judging else ()
-    for judge in judges:
-        known = f"needed one of {listed(verdicts)}, got {judge!r}"
-        refuse((judge not in verdicts, f"--judge: {known}"))
+    refuse(
+        *(
+            (
+                judge not in verdicts,
+                f"--judge: needed one of {listed(verdicts)}, got {judge!r}",
+            )
+            for judge in judges
+        )
+    )
     biases: list[Row] = []
     strengths: list[Row] = []
     for judge in judges or list(verdicts):
         with placed(file.read["file"], judge):
             bias = position_bias(verdicts[judge], tie=tie, level=questions.level)
             fit = bradley_terry(verdicts[judge], tie=tie, level=questions.level)
-        row = {
-            "judge": judge,
-            **{of: getattr(bias, of) for of in _OF_BIAS},
-            "p_value": bias.mcnemar.p_value,
-            "notes": bias.notes,
-        }
-        biases.append(row)
+        biases.append(
+            {
+                "judge": judge,
+                **{of: getattr(bias, of) for of in _OF_BIAS},
+                "p_value": bias.mcnemar.p_value,
+                "notes": bias.notes,
+            }
+        )
         numbers = np.array([fit.strengths, fit.low, fit.high]).T.tolist()
         strengths += [
             {
@@ -54,7 +61,6 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
             }
             for model, of_model in zip(fit.models, numbers, strict=True)
         ]
-    ties = f" A tie is {tie!r}." if tie else ""
     for name, kind, rows in (
         ("preferences", "position", biases),
         ("strengths", "strengths", strengths),
@@ -62,20 +68,23 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
         yield Answer(
             name=name,
             rows=rows,
-            shown=list(map(_shown, rows)),
-            notes=(note(kind, level=questions.level, ties=ties),),
+            shown=[
+                {**row, "title": row["judge"], "group": "", "texts": _texts(row)}
+                for row in rows
+            ],
+            notes=(
+                note(
+                    kind,
+                    level=questions.level,
+                    ties=f" A tie is {tie!r}." if tie else "",
+                ),
+            ),
         )
 
 
-def _shown(row: Row) -> Row:
-    reason = row.get("reason")
-    why = [] if reason is None else [f"undefined: {reason}"]
-    return {
-        **row,
-        "title": row["judge"],
-        "group": "",
-        "texts": [*why, *row["notes"]],
-    }
+def _texts(row: Row) -> list[str]:
+    why = row.get("reason")
+    return [*([f"undefined: {why}"] if why else []), *row["notes"]]
 
 
 def _verdicts(file: RatingsFile) -> tuple[dict[str, list[_Verdict]], str]:
@@ -93,8 +102,8 @@ def _verdicts(file: RatingsFile) -> tuple[dict[str, list[_Verdict]], str]:
     answers: dict[str, dict[str, None]] = {}  # of every item
     graded: list[tuple[str, str, str, str]] = []
     for part, first in zip(file.parts, shown_first, strict=True):
-        codes = code_ratings(part.ratings).codes  # (n_items, n_raters)
-        for item, of_item in zip(part.items or (), codes.tolist(), strict=True):
+        codes = code_ratings(part.ratings).codes.tolist()  # (n_items, n_raters)
+        for item, of_item in zip(part.items or (), codes, strict=True):
             of = answers.setdefault(item, {first: None})
             of[first] = None
             for rater, code in zip(part.raters, of_item, strict=True):

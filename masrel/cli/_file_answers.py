@@ -230,8 +230,12 @@ def _show_answers(
     judging = questions.judging
     reading = replace(reading, repeated="each") if questions.truth else reading
     if judging is not None:  # of a stream nobody knows which item is which
-        both = judging.order is not None and reading.by is not None
-        refuse((both, "--order, --by: needed one of them, got both"))
+        refuse(
+            (
+                judging.order is not None and reading.by is not None,
+                "--order, --by: needed one of them, got both",
+            )
+        )
         reading = replace(reading, stream=False, by=judging.order or reading.by)
     ratings = read_file(file, reading)
     questions = questions.on_scale(ratings)

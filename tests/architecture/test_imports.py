@@ -37,6 +37,12 @@ def loaded_after_each(*codes: str) -> list[set[str]]:
     return [set(json.loads(line)) for line in done.stdout.splitlines()]
 
 
+def loaded_after(code: str) -> set[str]:
+    """Names of the modules a fresh interpreter holds after a code."""
+    (loaded,) = loaded_after_each(code)
+    return loaded
+
+
 OF_GROUPS = ("joint", "record", "paper", "schedule", "status", "train")
 # code, and what it loads none of
 LOADS_NO: dict[str, set[str]] = {
@@ -92,5 +98,4 @@ def test_nothing_is_loaded_that_is_not_needed() -> None:
 
 
 def test_sub_packages_come_on_first_use() -> None:
-    (loaded,) = loaded_after_each("import masrel\nmasrel.lab.elbow.STANDARD_MODELS")
-    assert "numpy" in loaded
+    assert "numpy" in loaded_after("import masrel\nmasrel.lab.elbow.STANDARD_MODELS")

@@ -57,8 +57,10 @@ def check_gates(analysis: Analysis, gates: Iterable[Gate]) -> tuple[GateResult, 
     tuple of GateResult
         One per gate. A number that is undefined or not in the data fails.
     """
-    every: list[PlannedEstimate | PlannedJudge]
-    every = [*analysis.estimates, *analysis.judges]
+    every: list[PlannedEstimate | PlannedJudge] = [
+        *analysis.estimates,
+        *analysis.judges,
+    ]
     planned = {each.line.id: each for each in every}
     return tuple(
         gate.hold(*_number(gate.number, planned[gate.estimate])) for gate in gates

@@ -238,8 +238,9 @@ def _judge(line: JudgeKeys, ratings: Ratings) -> PlannedJudge:
             grades, judge, epsilon=line.epsilon, min_items=line.min_items
         )
     except (ParameterError, RatingsError) as error:
-        reason = f"not with the ratings that are there: {error}"
-        return PlannedJudge(line=line, reason=reason)
+        return PlannedJudge(
+            line=line, reason=f"not with the ratings that are there: {error}"
+        )
     return PlannedJudge(line=line, result=result)
 
 

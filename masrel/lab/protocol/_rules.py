@@ -702,14 +702,16 @@ def _sample_size(size: SampleSize, protocol: Protocol) -> Iterator[str]:
 
 def _judge(line: JudgeKeys, protocol: Protocol) -> Iterator[str]:
     # beside humans of one session, on presentations enough
-    estimates = [each.id for each in protocol.analysis.estimates]
     raters = {session.id: session.raters for session in protocol.sessions}
     met = raters.get(line.session, ())
     humans = line.humans or [name for name in met if name != line.judge]
     stray = [name for name in humans if name not in met or name == line.judge]
     n_items = len(protocol.models) * protocol.schedule.repeats
     return _broken(
-        (line.id in estimates, f"id: {got(line.id)} is an estimate of the plan, too"),
+        (
+            line.id in {each.id for each in protocol.analysis.estimates},
+            f"id: {got(line.id)} is an estimate of the plan, too",
+        ),
         (
             line.session not in raters,
             f"session: needed a session of [[sessions]] ({', '.join(raters)}), got "

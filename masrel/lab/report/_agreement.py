@@ -130,10 +130,9 @@ def judge_tables(material: Material) -> Iterator[Table]:
     rows: list[dict[str, Value]] = []
     for entry in material.analysis.judges:
         line, result = entry.line, entry.result
-        cells: dict[str, Value] = {"id": line.id, "judge": line.judge}
-        cells |= {"session": line.session, "reason": entry.reason}
+        of_result: dict[str, Value] = {}
         if result is not None:
-            cells |= {
+            of_result = {
                 "n_humans": len(result.humans),
                 "n_rejected": sum(human.is_rejected for human in result.humans),
                 "winning_rate": result.winning_rate,
@@ -142,7 +141,8 @@ def judge_tables(material: Material) -> Iterator[Table]:
                 "n_items": result.n_items,
                 "passes": "yes" if result.is_passed else "no",
             }
-        rows.append(cells)
+        head = {"id": line.id, "judge": line.judge, "session": line.session}
+        rows.append({**head, "reason": entry.reason, **of_result})
     if rows:
         whys = (f"{row['judge']}: {row['reason']}." for row in rows if row["reason"])
         caption, notes = "Judges beside the raters", (_JUDGED, *whys)
