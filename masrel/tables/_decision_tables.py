@@ -142,7 +142,7 @@ def study_tables(
     }
     document |= {name: getattr(study, name) for name in ("method", "mean", "n_levels")}
     last = rows["d_study"][-1]
-    sizes = joined([f"{last[name]} of {name}" for name in study.facets])
+    sizes = joined([f"{name} = {last[name]}" for name in study.facets])
     texts = [
         f"{heading} {number(last[of], 3)} "
         f"{interval_text(last[f'{of}_low'], last[f'{of}_high'])}"
@@ -150,7 +150,7 @@ def study_tables(
         if last[of] is not None
     ]
     cost = "" if last["cost"] is None else f" It costs {number(last['cost'], 1)}."
-    result = f"A mean over {sizes} has {joined(texts)}.{cost}"
+    result = f"The mean with {sizes} has {joined(texts)}.{cost}"
     first = replace(first, read=(read,), notes=(result, *study.notes))
     return [first, *more], {**document, "notes": [*study.notes]}
 
@@ -162,7 +162,7 @@ def study_curves(study: GStudy, aim: float | None) -> Drawn:
     curves = []
     for n_others in product(*steps):
         sizes = dict(zip(others, n_others, strict=True))
-        label = ", ".join(f"{n} of {name}" for name, n in sizes.items()) or "Φ"
+        label = ", ".join(f"{name} = {n}" for name, n in sizes.items()) or "Φ"
         points = [
             (n, d_study(study, {along: n, **sizes}).dependability) for n in range(1, 13)
         ]
