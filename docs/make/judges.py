@@ -17,15 +17,18 @@ CALLS = {
         *("--annotators", "skilled", "--target", "items"),
     ),
     "judges_corrected.png": ("monitor.csv", "--judge", "large", "--rate", "pass"),
+    "judges_strengths.png": ("preferences.csv", "--order", "first"),
 }
 
 
 def draw() -> None:
-    """Write the files of the first block of Python, and draw what is shown of them."""
+    """Write the files of the blocks of Python, and draw what is shown of them."""
     page = (ROOT / "docs" / "judges.md").read_text(encoding="utf-8")
-    block = next(of for of in read(page) if of.language == "python")
+    blocks = (of for of in read(page) if of.language == "python")
+    lines = ["\n".join(of.lines) for of in blocks if ".csv" in "".join(of.lines)]
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        exec("\n".join(block.lines), {})
+        for made in lines:
+            exec(made, {})
         for name, call in CALLS.items():
             command = [sys.executable, "-m", "masrel", "judge", *call]
             subprocess.run([*command, "--figure", FIGURES / name], check=True)

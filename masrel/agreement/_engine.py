@@ -237,6 +237,15 @@ def check_level(level: float, name: str = "level") -> None:
     refuse((not is_level, f"{name}: needs (0, 1), got {shown(level)}"))
 
 
+def logit_ends(share: float, half: float) -> tuple[float, float]:
+    """Return the ends about a share within (0, 1) that are symmetric on the logit."""
+    # half: of the width at the share itself, by the slope of the logit there
+    from scipy.special import expit, logit  # loaded only for an interval
+
+    of_logit = half / (share * (1.0 - share))
+    return float(expit(logit(share) - of_logit)), float(expit(logit(share) + of_logit))
+
+
 def undefined(title: str, reason: str) -> str:
     """Warn whoever called this package that a statistic is undefined; return why."""
     warn_caller(f"{title} is undefined: {reason}", UndefinedStatisticWarning)

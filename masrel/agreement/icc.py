@@ -23,6 +23,7 @@ from masrel.agreement._engine import (
     Formula,
     check_level,
     deviations,
+    logit_ends,
     measured,
     tested,
     undefined,
@@ -841,14 +842,14 @@ def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, float, str | 
 
 def _w_interval(w: float, error: float, n: int, level: float) -> Interval:
     """Return an interval symmetric on the logit."""
-    from scipy.special import expit, logit, stdtrit
+    from scipy.special import stdtrit
 
-    is_inside = 0.0 < w < 1.0 and error > _ROUNDING
-    t = stdtrit(n - 1, 0.5 + 0.5 * level)
-    half = t * error / (w * (1.0 - w)) if is_inside else math.nan
+    is_inside, low, high = 0.0 < w < 1.0 and error > _ROUNDING, math.nan, math.nan
+    if is_inside:
+        low, high = logit_ends(w, float(stdtrit(n - 1, 0.5 + 0.5 * level)) * error)
     return Interval(
-        low=float(expit(logit(w) - half)),
-        high=float(expit(logit(w) + half)),
+        low=low,
+        high=high,
         level=level,
         kind="confidence",
         method=f"delta method, t({n - 1}) on the logit",

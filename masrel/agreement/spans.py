@@ -13,12 +13,13 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import check_option, refuse, shown
+from masrel._input import check_option, listed, refuse, shown
 from masrel.agreement._engine import (
     Floats,
     Integers,
     check_level,
     divide,
+    logit_ends,
     undefined,
 )
 from masrel.agreement._labels import Label, coded, columns_of, is_missing
@@ -243,19 +244,20 @@ def _estimate(
 ) -> Estimate:
     """Return a value with its interval on the logit of the place from `lowest` to 1."""
     # without (n_documents,): the values without each document
-    from scipy.special import expit, logit, stdtrit  # loaded only for an interval
+    from scipy.special import stdtrit  # loaded only for an interval
 
     n, no_spans = len(without), "0/0: there are no spans to compare"
     # (n - 1)/n Σ (θ_i - mean)²
     error = float(np.sqrt((n - 1) * without.var())) if n > 1 else np.nan
     reason = undefined(facts["coefficient"], no_spans) if np.isnan(value) else None
     why = None if error > 1e-12 and lowest < value < 1.0 else reason or _NO_ENDS
-    share, t = (value - lowest) / (1.0 - lowest), stdtrit(n - 1, 0.5 + 0.5 * level)
-    half = np.nan if why else t * error / (1.0 - share) / (value - lowest)
-    low, high = lowest + (1.0 - lowest) * expit(logit(share) + np.array([-half, half]))
+    room, ends = 1.0 - lowest, (np.nan, np.nan)
+    if why is None:
+        half = float(stdtrit(n - 1, 0.5 + 0.5 * level)) * error / room
+        ends = logit_ends((value - lowest) / room, half)
     interval = Interval(
-        low=float(low),
-        high=float(high),
+        low=lowest + room * ends[0],
+        high=lowest + room * ends[1],
         level=level,
         kind="confidence",
         method=f"document jackknife, t({n - 1}) on the logit",
@@ -348,7 +350,8 @@ def _laid(
         (order[[*crosses, *crosses + 1]], "of an observer and a category to lie apart"),
     ):
         spans = [
-            f"{[of[k] for of in names]} from {starts[k]} to {starts[k] + sizes[k]}"
+            f"{listed(repr(of[k]) for of in names if of[k] != '')} from {starts[k]} to "
+            f"{starts[k] + sizes[k]}"
             for k in bad
         ]
         refuse(

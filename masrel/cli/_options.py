@@ -1,6 +1,7 @@
 """Options that several verbs have, as one argument each, and what verbs print."""
 
 import json
+import re
 import shlex
 import sys
 import time
@@ -85,6 +86,26 @@ def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
 def split_commas(text: str) -> list[str]:
     """Return the parts of an option's value between its commas."""
     return [part.strip() for part in text.split(",")]
+
+
+def floats(text: str, number: type = float) -> list[Any]:
+    """Return numbers separated by commas, or first:last:step."""
+    try:
+        numbers = [number(part) for part in re.split("[,:]", text)]
+        if ":" in text:
+            first, last, step = numbers
+            n_steps = int((last - first) / step + 1e-9)
+            numbers = [number(round(first + k * step, 12)) for k in range(n_steps + 1)]
+    except (ValueError, ZeroDivisionError):
+        numbers = []
+    if not numbers:
+        raise click.BadParameter(f"needs numbers as 10,20 or 10:50:10, got {text!r}")
+    return numbers
+
+
+def whole_numbers(text: str) -> list[int]:
+    """Return the same, if they are whole."""
+    return floats(text, int)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

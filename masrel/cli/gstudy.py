@@ -12,14 +12,15 @@ from masrel.cli._options import (
     GroupedHelp,
     OutputOptions,
     call_text,
+    floats,
     grouped,
     output_options,
     split_commas,
+    whole_numbers,
     write_output,
 )
 from masrel.cli._paths import InputFile
 from masrel.cli._reading import options_of
-from masrel.cli.plan import floats, whole_numbers
 from masrel.errors import MasrelWarning
 from masrel.ratings._findings import Reading
 
@@ -123,23 +124,29 @@ def gstudy(
     from pandas import DataFrame
 
     from masrel.agreement import cheapest_design, d_study, g_study
+    from masrel.analysis._file_estimates import placed
     from masrel.pages._answer_page import study_page
     from masrel.ratings._reader import read_facets
-    from masrel.tables._decision_tables import study_curves, study_tables
+    from masrel.tables._decision_tables import (
+        study_curves,
+        study_methods,
+        study_tables,
+    )
     from masrel.tables._tables import SIMULATED
 
     sheet, columns = read_facets(file, facets, reading)
     of, *_, grade = columns
     within = dict(pair.partition(":")[::2] for pair in nested)
-    study = g_study(
-        DataFrame(columns),
-        of=of,
-        facets=facets,
-        nested=within,
-        fixed=fixed,
-        grade=grade,
-        **of_intervals,
-    )
+    with placed(str(file)):
+        study = g_study(
+            DataFrame(columns),
+            of=of,
+            facets=facets,
+            nested=within,
+            fixed=fixed,
+            grade=grade,
+            **of_intervals,
+        )
     levels = [
         [study.n_within(name)] if name in fixed else steps
         for name, steps in zip(facets, _LEVELS, strict=False)
@@ -161,7 +168,7 @@ def gstudy(
         text=lambda: shown[0],
         more=shown[1:],
         figure=lambda: curves,
-        html=lambda: study_page(shown, curves, inputs),
+        html=lambda: study_page(shown, curves, inputs, study_methods(study)),
         stamp=SIMULATED if sheet.is_simulated else "",
         notes=(*shown[0].read, *shown[0].notes),
     )

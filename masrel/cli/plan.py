@@ -1,6 +1,5 @@
 """``masrel plan``: how large a study must be, and what a study can show."""
 
-import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -12,8 +11,10 @@ from masrel.cli._options import (
     GroupedHelp,
     OutputOptions,
     Report,
+    floats,
     output_options,
     progress,
+    whole_numbers,
     write_output,
 )
 from masrel.cli._paths import InputFile
@@ -28,26 +29,6 @@ _NOT_OF_STUDIES = (  # what a protocol says
     *("coefficient", "weights", "n_items", "n_raters", "categories", "target"),
     *("pilot", "power", "assurance", "max_cost", "prices", "executor", "scheduler"),
 )
-
-
-def floats(text: str, number: type = float) -> list[Any]:
-    """Return numbers separated by commas, or first:last:step."""
-    try:
-        numbers = [number(part) for part in re.split("[,:]", text)]
-        if ":" in text:
-            first, last, step = numbers
-            n_steps = int((last - first) / step + 1e-9)
-            numbers = [number(round(first + k * step, 12)) for k in range(n_steps + 1)]
-    except (ValueError, ZeroDivisionError):
-        numbers = []
-    if not numbers:
-        raise click.BadParameter(f"needs numbers as 10,20 or 10:50:10, got {text!r}")
-    return numbers
-
-
-def whole_numbers(text: str) -> list[int]:
-    """Return the same, if they are whole."""
-    return floats(text, int)
 
 
 def _prevalences(text: str) -> list[Any]:

@@ -70,6 +70,7 @@ def spans(
     of brat, with a folder of each annotator. Krippendorff's unitizing alpha is of all
     observers together, F1 of every two.
     """
+    from masrel.analysis._file_estimates import placed
     from masrel.analysis._file_spans import span_answer
     from masrel.pages._answer_page import spans_page
     from masrel.plots._drawn_values import Drawn
@@ -77,7 +78,8 @@ def spans(
     from masrel.tables._answer_tables import answer_documents, answer_table
 
     rows, lengths, off = read_spans(file, reading, columns, step)
-    answer = span_answer(rows, lengths, off, level)
+    with placed(str(file)):
+        answer = span_answer(rows, lengths, off, level)
     table = answer_table(
         answer,
         bands=None,

@@ -300,9 +300,10 @@ def _choose_interval(
         return _other_items_and_raters(problem, rule)
     few = problem.n_paired_items < _FEW and problem.n_paired_raters < _FEW
     outside, rare = _outside_commonest(problem)
-    is_modelled = (few or rare) and problem.target != "raters"
-    models = rule.models(problem, few=few) if is_modelled else ()
-    interval = reduce(_joined, (_posterior(problem, model) for model in models), None)
+    interval = None
+    if (few or rare) and problem.target != "raters":
+        models = rule.models(problem, few=few)
+        interval = reduce(_joined, (_posterior(problem, model) for model in models))
     if interval is None:
         return _jackknife_with_spread(problem)
     if few:
@@ -391,7 +392,7 @@ def _posterior(problem: IntervalProblem, model: _Model) -> Interval | None:
 def _joined(one: Interval | None, other: Interval | None) -> Interval | None:
     """Return an interval that holds two of one problem."""
     if one is None or other is None:
-        return one or other
+        return one
     return replace(
         other,
         low=min(one.low, other.low),

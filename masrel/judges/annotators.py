@@ -31,6 +31,7 @@ from masrel.agreement._engine import (
     Integers,
     check_level,
     divide,
+    logit_ends,
     undefined,
 )
 from masrel.agreement._labels import check_categories, label_codes
@@ -612,10 +613,7 @@ def advantage(
     method, reason = interval.method, None
     if 0.0 < value < 1.0:
         error, reason = rest.error(np.ones(1))
-        # symmetric on the logit, by whose slope the error is multiplied
-        half = student_t(level, rest.df) * error / (value * (1.0 - value))
-        odds = value / (1.0 - value)
-        low, high = (1.0 / (1.0 + math.exp(-x) / odds) for x in (-half, half))
+        low, high = logit_ends(value, student_t(level, rest.df) * error)
         method = f"{interval.method} on the logit"
     elif target == "items":
         # of n units none was otherwise: Clopper and Pearson's interval

@@ -322,9 +322,10 @@ def spans_page(table: Table, drawn: Drawn, inputs: Mapping[str, str]) -> str:
 
 
 def study_page(
-    tables: Sequence[Table], curves: Drawn, inputs: Mapping[str, str]
+    tables: Sequence[Table], curves: Drawn, inputs: Mapping[str, str], methods: str
 ) -> str:
     """Return the page of a generalizability study: its tables and its curves."""
+    # methods: how it was made, to paste
     first, *more = tables
     stamp = SIMULATED if "simulated" in first.data else ""
     drawing = Drawing(
@@ -334,8 +335,9 @@ def study_page(
         content=curves,
         stamp="",
     )
-    table = replace(first, caption="Components of variance", read=())
-    texts = (first.read[0], *reference_texts(["brennan2001"]))
+    notes = first.notes[1:]  # the result stands above
+    table = replace(first, caption="Components of variance", read=(), notes=notes)
+    texts = (methods, *reference_texts(["brennan2001"]))
     paper = [Paragraph(text=text) for text in texts]
     sections = [
         Section(name="result", title="Result", blocks=(table, drawing, *more)),

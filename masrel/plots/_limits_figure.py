@@ -109,6 +109,10 @@ def limits_pictures(panels: "Sequence[Panel]", unit: str) -> list[tuple[str, Pic
     ]
 
 
+# Names of lines that may lie near each other, on either side of the mean's
+_BESIDE = {"upper limit": "bottom", "lower limit": "top"}
+
+
 def _same(panel: "Limits") -> float:
     # where two that are the same lie: no difference, or a ratio of 1
     return float(getattr(panel, "kind", None) == "ratio")
@@ -176,9 +180,10 @@ def _draw(
     axes.set(xlabel=f"mean of {mean}{of_unit}", ylabel=f"{less}{of_unit}")
     axes.margins(x=0.06)
     axes.set_ylim(*reach)
+    of = "measurement" if hasattr(panel, "limit") else "item"
     mark = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0, **_DOT}
     marks = [
-        Line2D([], [], markersize=(area * n) ** 0.5, label=counted(n, "item"), **mark)
+        Line2D([], [], markersize=(area * n) ** 0.5, label=counted(n, of), **mark)
         for n in (1, most)
         if most > 1 and len(freq) <= _MAX_DOTS
     ]
@@ -233,6 +238,6 @@ def _draw_lines(axes: Axes, panel: "Limits") -> None:
             xycoords=("axes fraction", "data"),
             xytext=(4, 0),
             textcoords="offset points",
-            va="center",
+            va=_BESIDE.get(name, "center"),
             fontsize=7.5,
         )

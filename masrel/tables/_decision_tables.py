@@ -125,10 +125,9 @@ def study_tables(
     }
     read = (
         f"Read {Path(file).name}: {counted(study.n_ratings, 'rating')} with mean "
-        f"{number(study.mean, 3, in_units=True)}, of "
-        + joined([f"{n} {name}" for name, n in study.n_levels.items()])
-        + f"; components by {study.method}, {percent(study.level)} % intervals for "
-        "others of each."
+        f"{number(study.mean, 3, in_units=True)}; levels: {_levels(study)}; "
+        f"components by {study.method}, {percent(study.level)} % intervals for others "
+        "of each."
     )
     first, *more = (
         table_of(name, _CAPTIONS[name], of, rows[name], hide_empty=True, data=data)
@@ -153,6 +152,21 @@ def study_tables(
     result = f"The mean with {sizes} has {joined(texts)}.{cost}"
     first = replace(first, read=(read,), notes=(result, *study.notes))
     return [first, *more], {**document, "notes": [*study.notes]}
+
+
+def _levels(study: GStudy) -> str:
+    return joined([f"{name} {n}" for name, n in study.n_levels.items()])
+
+
+def study_methods(study: GStudy) -> str:
+    """Return how a study was made, in sentences for a paper."""
+    (method,) = {of.method for of in study.intervals.values()}
+    return (
+        f"Components of variance were estimated by {study.method} from "
+        f"{counted(study.n_ratings, 'rating')} (levels: {_levels(study)}), with "
+        f"{percent(study.level)} % intervals ({method}); reliability and its "
+        "intervals are made of the same components (Brennan, 2001)."
+    )
 
 
 def study_curves(study: GStudy, aim: float | None) -> Drawn:

@@ -18,7 +18,7 @@ TABLES = "numbers"
 """The group of 2 000 tables, whose keys are short and whose ends may be drawn."""
 
 COEFFICIENTS = (
-    "agreement", "agree", "analyze", "demo", "transcripts",
+    "agreement", "intervals", "agree", "analyze", "demo", "transcripts",
 )  # fmt: skip
 """Groups whose values are coefficients, good to some ulp."""
 

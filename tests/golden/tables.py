@@ -1,7 +1,4 @@
-"""Cases of the agreement library: coefficients and tests of drawn tables.
-
-Intervals of tables are in the group "numbers".
-"""
+"""Cases of the agreement library: coefficients, intervals and tests of drawn tables."""
 
 from collections.abc import Callable
 from functools import partial
@@ -13,6 +10,28 @@ from tests.golden.drawn import N_TABLES, Drawn, drawn
 
 WEIGHTS = ("identity", "linear", "quadratic")
 
+BOOTSTRAPS = (
+    {"target": "items", "exact": False, "n_resamples": 200},
+    {"target": "items", "exact": False, "n_resamples": 200, "kind": "bca"},
+    {"target": "items", "exact": False, "n_resamples": 200, "kind": "studentized"},
+    {"target": "items", "exact": False, "n_resamples": 200, "kind": "basic"},
+    {"target": "raters"},
+    {"target": "raters", "kind": "bca"},
+    {"target": "both"},
+)
+
+SEED = {"rng": 7}
+
+METHODS: tuple[tuple[str, dict[str, object]], ...] = (
+    ("analytic", {"target": "items"}),
+    *(("jackknife", {"target": target}) for target in ("items", "raters", "both")),
+    *(("bootstrap", {**options, **SEED}) for options in BOOTSTRAPS),
+    ("posterior", {"target": "items", **SEED}),
+    ("posterior", {"target": "items", "prior": "jeffreys", **SEED}),
+    *(("estimate", {"target": t, **SEED}) for t in ("items", "raters", "both")),
+    ("estimate", {"target": "items", "level": 0.8, **SEED}),
+)
+"""Function of `masrel.intervals` and its options."""
 
 OF_COUNTED = (
     "percent_agreement",
@@ -22,6 +41,8 @@ OF_COUNTED = (
     "krippendorff_alpha",
 )
 
+OF_POSTERIOR = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
+
 
 PICKED = (
     "percent_agreement", "cohen_kappa", "conger_kappa", "fleiss_kappa", "light_kappa",
@@ -29,7 +50,7 @@ PICKED = (
     "pooled_kappa", "kendall_w", "robinson_a", "icc_1", "icc_1k", "icc_c1", "icc_ck",
     "icc_a1", "icc_ak",
 )  # fmt: skip
-"""Coefficients whose differences are stored, picked by their places here."""
+"""Coefficients whose intervals are stored, picked by their places here."""
 
 VALUED = (*PICKED, "lin_ccc", "sem", "sem_consistency", "mdc", "mdc_consistency")
 """Coefficients whose values are stored. A new one stands in no table of before."""
@@ -37,7 +58,7 @@ VALUED = (*PICKED, "lin_ccc", "sem", "sem_consistency", "mdc", "mdc_consistency"
 
 def cases() -> list[Case]:
     """One case a table and group."""
-    groups = {"agreement": _coefficients, "tests": _tests}
+    groups = {"agreement": _coefficients, "intervals": _intervals, "tests": _tests}
     made = [
         Case(group, f"table-{seed:03}", partial(make, seed))
         for group, make in groups.items()
@@ -112,6 +133,82 @@ def _from_counts(table: Drawn, seed: int) -> dict:
         for name, entry in sorted((name, COEFFICIENTS[name]) for name in PICKED)
         if entry.formula and not entry.tells_raters_apart
     }
+
+
+def _intervals(seed: int) -> dict:
+    # five of all pairs of a method and a coefficient, others for every table
+    table, made = drawn(seed), {}
+    if table.is_counts:
+        return _of_counted_cells(seed)
+    for k in range(5):
+        method, options = METHODS[(5 * seed + k) % len(METHODS)]
+        names = _applicable(table, method, every=seed % 10 == 0)
+        name = names[(5 * seed + 7 * k) % len(names)]
+        weights = "identity" if method == "posterior" else _weights(name, seed // 2 + k)
+        made[_title(name, method, options)] = outcome(
+            getattr(intervals, method),
+            name,
+            _shaped(table, name),
+            categories=table.categories,
+            weights=weights,
+            **options,
+        )
+    return made
+
+
+def _applicable(table: Drawn, method: str, *, every: bool) -> list[str]:
+    # all names where refusals are to be seen, too
+    two = len(table.rows[0]) == 2
+    return [
+        name
+        for name in PICKED
+        if every or _applies(COEFFICIENTS[name], method, two=two)
+    ]
+
+
+def _applies(entry: agreement.Coefficient, method: str, *, two: bool) -> bool:
+    has_interval = entry.formula and not entry.has_interval
+    if method == "estimate" and entry.name != "kendall_w":
+        has_interval = entry.formula or entry.has_interval
+    if not has_interval or (entry.n_raters == (2, 2) and not two):
+        return False
+    is_modelled = entry.shape == "ratings" and (two or entry.name in OF_POSTERIOR)
+    return method != "posterior" or is_modelled
+
+
+def _title(name: str, method: str, options: dict[str, object]) -> str:
+    words = (str(value) for key, value in options.items() if key != "rng")
+    return " ".join([name, method, *words])
+
+
+def _of_counted_cells(seed: int) -> dict:
+    # estimates of cells, and intervals of the same items one by one
+    cells = _contingency(seed)
+    rows = [
+        [k, m]
+        for k, row in enumerate(cells)
+        for m, count in enumerate(row)
+        for _ in range(count)
+    ]
+    weights, options = WEIGHTS[seed % 3], {"categories": list(range(len(cells)))}
+    made: dict = {"cells": cells}
+    for function in (agreement.cohen_kappa, agreement.scott_pi):
+        made[f"{function.__name__}_from_table"] = outcome(
+            lambda cells, of=function, **options: of(
+                agreement.count_table(cells), **options
+            ),
+            cells,
+            weights=weights,
+        )
+    made["counted"] = outcome(
+        agreement.fleiss_kappa, agreement.count_table(cells), weights=weights
+    )
+    for k, name in enumerate(("cohen_kappa", "fleiss_kappa", "gwet_ac")):
+        method, more = METHODS[(seed // 5 + 6 * k) % len(METHODS)]
+        made[_title(name, method, more)] = outcome(
+            getattr(intervals, method), name, rows, **options, **more
+        )
+    return made
 
 
 def _contingency(seed: int) -> list[list[int]]:

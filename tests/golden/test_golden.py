@@ -26,7 +26,8 @@ def _mark(case: Case) -> pytest.MarkDecorator:
 
     It leaves out other chains of a latent trait, too.
     """
-    is_left = case.group == "agreement" and zlib.crc32(case.name.encode()) % 4 != 0
+    is_of_tables = case.group in ("agreement", "intervals")
+    is_left = is_of_tables and zlib.crc32(case.name.encode()) % 4 != 0
     is_long = is_left or case.name == "random"
     return pytest.mark.long if is_long else pytest.mark.slow
 
