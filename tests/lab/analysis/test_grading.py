@@ -10,6 +10,7 @@ import pytest
 import statsmodels.api as sm
 from scipy.optimize import minimize
 
+from masrel.errors import UndefinedStatisticWarning
 from masrel.lab.analysis import grade_regression
 from masrel.lab.protocol import Protocol, read_protocol, scale_of
 from masrel.lab.ratings import Ratings, ratings_from_rows, read_study_ratings
@@ -160,3 +161,17 @@ def test_a_constant_predictor_is_named_and_ratings_without_a_speed_are_counted(
         found[name] = grade_regression(protocol, changed, predictors=("speed", "H"))
     assert found["same"].dropped == (("speed", "it is the same in all ratings"),)
     assert (found["gaps"].n_missing, found["gaps"].n_ratings) == (5, 115)
+
+
+def test_four_models_cannot_tell_four_parameters_apart() -> None:
+    protocol, ratings = published()
+    with pytest.warns(UndefinedStatisticWarning, match="separate some grades"):
+        found = grade_regression(protocol, ratings)
+    assert found.dropped == (("D", "it is a combination of L, H, Q in these ratings"),)
+    # nobody gave HM1 or HM2 a 2, or HM3 or HM4 a 1+: the gap can grow for ever
+    assert found.reason is not None
+    assert all(math.isnan(effect.odds_ratio) for effect in found.effects)
+    assert (found.n_ratings, found.n_raters, found.n_models) == (32, 8, 4)
+    # the most severe model was stretched slowest in Table V
+    (effect,) = grade_regression(protocol, ratings, predictors=("speed",)).effects
+    assert effect.low < effect.odds_ratio < min(1.0, effect.high)

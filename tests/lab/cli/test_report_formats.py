@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import stat
 import subprocess
 import sys
 import sysconfig
@@ -18,6 +19,7 @@ from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 from tests.files import edit, published_study
 
+SETPRIV = shutil.which("setpriv")
 TITLE = "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
 FORMATS = ("html", "markdown", "latex", "docx")
 
@@ -189,3 +191,51 @@ def test_a_format_that_is_not_made_again_goes(
     masrel("report", root, "--quiet")
     assert [page.exists() for page in pages] == [True, False]
     assert masrel("report", root, "--check", "--quiet").code == 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(SETPRIV is None, reason="nothing here takes root's privileges")
+def test_a_foreign_environment_changes_no_byte_and_is_not_written_to(
+    study: Path, folder: Path, tmp_path: Path
+) -> None:
+    package = tmp_path / "site" / "masrel"
+    shutil.copytree(
+        Path(masrel.__file__).parent, package, ignore=shutil.ignore_patterns("*.pyc")
+    )
+    for path in (package.parent, *package.parent.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    # root itself may write anywhere but without this capability
+    bare = [str(SETPRIV), "--bounding-set=-dac_override", "--inh-caps=-dac_override"]
+    probe = subprocess.run([*bare, "touch", package / "written"], check=False)
+    assert probe.returncode != 0
+    settings = tmp_path / "matplotlibrc"
+    templates = tmp_path / "pandoc" / "templates"
+    templates.mkdir(parents=True)
+    (templates / "default.latex").write_text("mine")
+    settings.write_text("font.size: 30\nsavefig.dpi: 30\nsvg.fonttype: path\n")
+    environment = os.environ | {
+        "LANG": "de_DE.UTF-8",
+        "LC_ALL": "C",
+        "TZ": "Asia/Seoul",
+        "HOME": str(tmp_path),
+        "XDG_DATA_HOME": str(tmp_path),
+        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+        "MATPLOTLIBRC": str(settings),
+        "PYTHONHASHSEED": "7",
+        "PYTHONPATH": str(package.parent),
+    }
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    other = tmp_path / "other"
+    call = ["-P", "-m", "masrel", "report", str(study), "-o", str(other)]
+    call += ["--cache", str(tmp_path / "cache")]
+    subprocess.run(
+        [*bare, "sh", "-c", 'umask 077; exec "$@"', "sh", sys.executable, *call],
+        env=environment, check=True, capture_output=True,
+    )  # fmt: skip
+    made, expected = (
+        {f.relative_to(of): f.read_bytes() for f in of.rglob("*") if f.is_file()}
+        for of in (other, folder)
+    )
+    assert len(made) > 8
+    assert made == expected
+    assert stat.S_IMODE((other / "report.html").stat().st_mode) == 0o600

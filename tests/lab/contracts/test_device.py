@@ -18,6 +18,8 @@ from masrel.lab import hess
 from masrel.lab.hess import (
     BackendOptions,
     Device,
+    PresentationStatus,
+    Presented,
     Reading,
     ReplayOptions,
     SimulatedClock,
@@ -28,10 +30,11 @@ from masrel.lab.hess import (
     open_device,
     run_presentation,
 )
-from masrel.lab.recording import MEASURED_TORQUE, Channel, Recording
+from masrel.lab.recording import MEASURED_TORQUE, Channel, Recording, stretches
 from tests.lab.hess.rig import (
     LIMITS,
     START,
+    ActingClock,
     ScriptedDevice,
     controls,
     present,
@@ -395,3 +398,57 @@ def test_a_presentation_runs_on_it(
 
 
 # Many stretches, and their soft ends
+
+
+def presented_many(backend: str, done_s: float | None = None) -> Presented:
+    status = PresentationStatus()
+    hand = stretching(90.0, again=(SPEED,), returns=True)
+    clock = ActingClock({})
+    angle = lambda time_s: hand.intended(time_s)[0]  # noqa: E731
+    with device_of(backend, clock, 2, angle=angle) as device:
+        if done_s is not None:
+            clock.acts[clock.now_ns() * 1e-9 + done_s] = lambda _: status.done()
+        presented = run_presentation(
+            device,
+            controls("HM4"),
+            clock=clock,
+            limits=LIMITS,
+            stretches=StretchRules(n=2),
+            status=status,
+        )
+        assert device.is_open
+    assert status.n_stretches == len(stretches(presented.recording))
+    return presented
+
+
+def assert_softly(presented: Presented) -> None:
+    """A catch, a post-catch and a presentation end within 100 ms, by no more a tick."""
+    columns = presented.recording.columns
+    torque, phase = columns["command_torque_nm"], columns["phase"]
+    ends = np.flatnonzero((phase[:-1] > 0.0) & (phase[1:] == 0.0))
+    for stands in [*ends, presented.recording.n_presented - 1]:
+        falls = -np.diff(np.abs(torque[stands : stands + 101]))
+        most = math.pi / 2.0 * abs(torque[stands]) / 100.0 + 1e-9
+        assert falls.max() <= most
+    assert torque[-1] == 0.0
+
+
+def test_a_rater_may_be_done_in_a_catch(backend: str) -> None:
+    presented = presented_many(backend, 0.65)
+    assert presented.fault is None
+    assert presented.recording.facts["ended"] == "done"
+    assert presented.recording.n_presented == pytest.approx(650, abs=2)
+    assert_softly(presented)
+
+
+def test_an_arm_may_be_stretched_many_times(backend: str) -> None:
+    presented = presented_many(backend)
+    assert presented.fault is None
+    assert presented.recording.facts["ended"] == "stretches"
+    made = stretches(presented.recording)
+    assert [one.number for one in made] == [1, 2]
+    for one in made:
+        assert one.phases == ("pre-catch", "catch", "post-catch", "pre-catch")
+        assert one.mean_speed_deg_s == pytest.approx(89.2, abs=1.0)
+        assert one.catch_angle_deg == pytest.approx(made[0].catch_angle_deg, abs=0.3)
+    assert_softly(presented)

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from tests.docs.test_pages import hold_page
+from docs.make.pages import read
+from tests.docs.test_pages import TEXTS, hold_page
 from tests.files import table_of
 
 PAGE = "docs/coordinating.md"
@@ -58,3 +59,8 @@ def test_kappa_is_that_of_the_logs(run: Path, logs: Said) -> None:
     assert kappa["estimate"]["value"] == pytest.approx(value, abs=1e-12)
     n_items, n_raters = len(kappa["items"]), len(kappa["raters"])
     assert n_pairs == n_items * n_raters * (n_raters - 1) / 2 == 40
+
+
+def test_the_page_has_no_more_than_forty_commands() -> None:
+    lines = [line for block in read(TEXTS[PAGE]) for line in block.lines]
+    assert sum(line.startswith("$ ") for line in lines) <= 40

@@ -3,6 +3,7 @@
 import gc
 import json
 import math
+import warnings
 from dataclasses import replace
 from math import radians
 
@@ -16,6 +17,7 @@ from masrel.errors import (
 )
 from masrel.lab.hess import (
     DeviceLimits,
+    RealClock,
     SimulatedClock,
     open_device,
     run_presentation,
@@ -448,3 +450,34 @@ def test_what_cannot_be_run_is_refused_before_anything_moves(
             scripted(device=device, model=controls(), **change)
         assert device.n_reads == 0
         assert device.commands == []
+
+
+def test_with_a_real_clock_it_goes_the_same_way() -> None:
+    # A short stretch, 100 to 146 deg at 110 deg/s: about 0.6 s with the rests. How
+    # late the machine is may differ, so every tick may be missed without a fault, and
+    # a reading may be as old as the machine was away.
+    limits = DeviceLimits(missed_ticks=2_000, watchdog_time=1.0, stale_time=0.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OverrunWarning)
+        real, simulated = (
+            present(
+                "HM1",
+                hand=stretching(110.0, start=radians(100.0)),
+                clock=clock,
+                limits=limits,
+                max_duration_s=1.4,
+            ).recording
+            for clock in (RealClock(), SimulatedClock())
+        )
+    assert real.facts["fault"] is None
+    assert real.facts["ended"] == simulated.facts["ended"] == "arrived"
+    assert real.facts["phases"] == simulated.facts["phases"]
+    times = real.columns["time_s"]
+    assert np.all(np.diff(times) > 0.0)
+    # Every tick was run or counted as missed.
+    n_ticks = real.n_samples + real.facts["n_missed_ticks"]
+    assert n_ticks == math.floor(times[-1] * 1000) + 1
+    angles = np.interp(
+        times, simulated.columns["time_s"], simulated.columns["angle_deg"]
+    )
+    np.testing.assert_allclose(real.columns["angle_deg"], angles, atol=2.0)

@@ -15,6 +15,14 @@ from tests.lab.report.pages import (
 )
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
 def csv_rows(path: Path) -> list[list[str]]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.reader(file))
@@ -157,3 +165,14 @@ def test_the_inputs_are_named_and_symbols_have_their_index_set_low(
             assert re.search(rf"SHA-256 of the {name}\W+.*[0-9a-f]{{64}}", text)
     text = published.html.read_text(encoding="utf-8")
     assert ("ν<sub>L</sub>" in text, "ν_L" in text) == (True, False)
+
+
+def test_no_file_holds_a_time_of_day(published: ReportFiles) -> None:
+    folder = published.html.parent
+    for name, data in contents(folder).items():
+        if not name.endswith(".png"):
+            assert not re.search(rb"\b20\d\d-\d\d-\d\d\b|\b\d\d:\d\d:\d\d\b", data), (
+                name
+            )
+        assert b"dc:date" not in data
+        assert b"tIME" not in data

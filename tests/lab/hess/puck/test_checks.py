@@ -309,3 +309,21 @@ def test_errors_are_those_of_least_squares() -> None:
 def test_runs_that_cannot_tell_are_refused(runs: list[SteadyRun]) -> None:
     with pytest.raises(ParameterError, match="at two speeds and in both directions"):
         fit_friction(runs)
+
+
+# A mirrored puck is the same to everybody: counts and torques change their signs
+# together, so that only a person who looks at the arm can tell (docs/hardware.md).
+@pytest.mark.parametrize(
+    ("start_deg", "options"), [(120.0, {}), (60.0, {"direction": -1})]
+)
+def test_a_free_arm_says_its_friction_from_wherever_it_starts(
+    start_deg: float, options: dict
+) -> None:
+    clock, hand = SimulatedClock(), loose(start_deg)
+    options = puck_options(hand, **options)
+    two = (radians(40.0), radians(80.0))
+    with open_device("puck", clock=clock, hand=hand, options=options) as device:
+        estimate = fit_friction(steady_runs(device, clock, speeds=two))
+    assert device.emulator.mode == 0
+    assert estimate.viscous == pytest.approx(0.168, rel=0.03)
+    assert estimate.coulomb == pytest.approx(0.189, rel=0.03)

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scipy import stats
 
 from masrel.lab.elbow._polynomials import (
     first_above,
     largest,
     product,
     split_at_roots,
+    value,
 )
 from masrel.lab.elbow.identification._catches import Catch
 from masrel.lab.elbow.identification._clusters import (
@@ -273,3 +275,47 @@ def test_the_row_of_the_last_fit_has_the_slope_and_curvature_of_the_chance(
     assert left**2 / 2.0 == pytest.approx(float(value), rel=1e-9)
     assert left * slope == pytest.approx(float(by_mean), rel=1e-9)
     assert root**2 == pytest.approx(2.0 * float(twice), rel=1e-6)
+
+
+def test_where_everything_is_seen_it_is_students_interval() -> None:
+    found, _ = censored(SEEN, [])
+    peer = stats.ttest_1samp(SEEN, 0.0)
+    interval = peer.confidence_interval(0.95)
+    assert (found.value, found.df) == (float(np.mean(SEEN)), len(SEEN) - 1)
+    assert found.standard_error == pytest.approx(stats.sem(SEEN), rel=1e-8)
+    assert (found.low, found.high) == pytest.approx(tuple(interval), rel=1e-12)
+
+
+def test_intervals_of_censored_travels_cover_and_those_of_the_seen_do_not() -> None:
+    # 100 studies of 12 travels, half of them cut off near their mean. True coverage
+    # of 95 % gives fewer than 88 once in 700 times; the seed is fixed. Leaving out what
+    # is not seen covers three quarters.
+    rng = np.random.default_rng(20)
+    covered = plain = 0
+    for _ in range(100):
+        all_travels = rng.standard_normal(12)
+        limits = 0.5 * rng.standard_normal(12)
+        ends = all_travels < limits
+        if ends.sum() < 2:
+            continue
+        found, _ = censored(all_travels[ends].tolist(), limits[~ends].tolist())
+        covered += found.low <= 0.0 <= found.high
+        naive, _ = censored(all_travels[ends].tolist(), [])
+        plain += naive.low <= 0.0 <= naive.high
+    assert covered >= 88
+    assert plain < 86
+
+
+def test_a_place_nearer_to_the_end_than_a_tie_is_none() -> None:
+    assert math.isnan(first_above([-1.0 + 1e-14, 1.0], 0.0, 1.0))
+    assert first_above([-1.0 + 1e-12, 1.0], 0.0, 1.0) == pytest.approx(1.0)
+    cubic = with_roots(1.0 - 1e-15, 3.0, 4.0)
+    assert math.isnan(first_above(cubic, 0.0, 1.0))
+
+
+def test_between_cuts_where_0_is_touched_there_is_nothing_but_rounding() -> None:
+    touching = with_roots(0.3, 0.3)
+    for place in split_at_roots(touching, 1.0)[1:-1]:
+        assert value(touching, place) == pytest.approx(0.0, abs=1e-14)
+    x = first_above([-c for c in touching], 0.0, 1.0)
+    assert math.isnan(x) or value(touching, x) == pytest.approx(0.0, abs=1e-14)

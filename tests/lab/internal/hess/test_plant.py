@@ -225,3 +225,30 @@ def test_an_arm_that_nobody_holds_comes_to_rest(model: str, command_nm: float) -
     assert max(angles) - min(angles) > radians(1.0)  # it was moved
     assert len(set(angles[-1000:])) == 1
     assert abs(torque) <= Friction().coulomb
+
+
+def test_a_command_that_comes_during_the_delay_replaces_nothing() -> None:
+    plant = loose(step_ns=100_000, lag_time=0.0, torque_step=0.0)
+    plant.command(1.0, 0)
+    plant.command(2.0, 300_000)
+    seen = []
+    for tick in range(1, 12):
+        plant.advance(tick * 100_000)
+        seen.append(plant.motor_torque)
+    assert seen == [0.0] * 5 + [1.0] * 3 + [2.0] * 3
+
+
+def test_a_sliding_arm_stops_when_its_energy_is_eaten_and_stays() -> None:
+    # It breaks away within a 1024th of a step, 0.5 µs, of the command: 1e-5 of 0.1 s.
+    # 0.5 I v² = β s: pushed with 1 N·m for 0.1 s. I = 0.06: v = (1 - 0.189) 0.1 / 0.06,
+    # 1.3517 rad/s; it slides on by 0.06 v² / (2 · 0.189) = 0.29002 rad.
+    plant = loose(friction=STICKY, **INSTANT)
+    plant.command(-1.0, 0)
+    plant.advance(100_000_000)
+    speed = (1.0 - 0.189) * 0.1 / 0.06
+    assert plant.velocity == pytest.approx(speed, rel=1e-5)
+    left = plant.angle
+    plant.command(0.0, 100_000_000)
+    plant.advance(1_000_000_000)
+    assert plant.angle - left == pytest.approx(0.06 * speed**2 / (2 * 0.189), rel=2e-5)
+    assert plant.velocity == 0.0
