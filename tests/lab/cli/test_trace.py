@@ -318,3 +318,13 @@ def test_a_contracture_has_no_difference_and_speeds_can_be_chosen() -> None:
     # 3.32 (θ - 56.27° + 0.25 s · 120°/s) = 3 N·m
     fires = degrees(3.0 / ClaspKnife().reflex_stiffness) + 56.27 - 0.25 * 120
     assert made[1]["r1_deg"] == pytest.approx(fires)
+
+
+def test_lines_of_a_figure_have_as_many_points_as_pixels(tmp_path: Path) -> None:
+    # 0.001 deg/s: 116 000 s, at 1 kHz 116 million samples
+    slow = ("--model", "HM3", "--speed-deg-s", 0.001)
+    file = tmp_path / "slow.svg"
+    assert run(*slow, "--figure", file).exit_code == 0
+    paths = re.findall(r'<path d="([^"]*)"', file.read_text("utf-8"))
+    n_points = [len(re.findall("[ML]", path)) for path in paths]
+    assert 1 < max(n_points) < 900

@@ -1,15 +1,28 @@
 """What docs/driver.md says is what the driver does."""
 
+import csv
 import re
+from math import radians
 from pathlib import Path
 
 import pytest
 
+from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.lab.hess import Friction, device_names
 from masrel.lab.protocol import DeviceSettings
 
+from .rig import END, START
+
+STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
 DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "driver.md").read_text(encoding="utf-8")
+
+
+def table_5() -> list[tuple[str, float]]:
+    # Every model with every mean speed at which a rater stretched it
+    with (STUDY / "ratings" / "published.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return [(row["model"], float(row["mean_speed_deg_s"])) for row in rows]
 
 
 def row(first: str) -> list[str]:
@@ -50,3 +63,12 @@ def test_the_friction_is_the_default_one() -> None:
         f"{friction.inertia} kg·m², {friction.viscous} N·m·s/rad, "
         f"{friction.coulomb} N·m"
     )
+
+
+def test_the_largest_torque_of_table_5_is_the_one_the_limit_is_explained_by() -> None:
+    peaks = []
+    for model, speed_deg_s in table_5():
+        motion = MinimumJerk(start=START, end=END, mean_speed=radians(speed_deg_s))
+        peaks.append((trace(STANDARD_MODELS[model], motion).torque.max(), model))
+    assert max(peaks) == (pytest.approx(18.3, abs=0.05), "HM4")
+    assert "HM4 at a mean speed of 72 deg/s asks for most, 18.3 N·m" in PAGE

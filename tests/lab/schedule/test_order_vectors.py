@@ -1,8 +1,10 @@
 """The test vectors of docs/orders.md, and some of them derived from its rules alone."""
 
 import hmac
+import itertools
 import re
 from collections.abc import Iterator
+from math import comb, factorial
 from pathlib import Path
 from typing import Any
 
@@ -79,3 +81,25 @@ def test_a_williams_design_is_what_its_rule_gives_by_hand() -> None:
     for row in (1, 2):
         by_hand = " ".join(models[symbol] for symbol in lines[row - 1])
         assert drawn(f"`williams`, row {row}") == by_hand
+
+
+def test_standards_apart_are_what_the_rule_gives_by_hand() -> None:
+    n_orders = comb(5, 4) * factorial(4) * factorial(4)
+    assert n_orders == 2880
+    x = next(words("schedule", "test", "R1")) % n_orders
+
+    def arranged(models: tuple[str, ...], x: int) -> tuple[list[str], int]:
+        order, left = [""] * 4, [0, 1, 2, 3]
+        for model in reversed(models):
+            x, place = divmod(x, len(left))
+            order[left.pop(place)] = model
+        return order, x
+
+    standards, x = arranged(MODELS[:4], x)
+    dummies, x = arranged(MODELS[4:], x)
+    gaps = list(itertools.combinations(range(5), 4))[x]
+    by_hand = []
+    for gap in range(5):
+        by_hand += [standards.pop(0)] if gap in gaps else []
+        by_hand += [dummies.pop(0)] if dummies else []
+    assert drawn("`restricted`, `standards_apart`") == " ".join(by_hand)

@@ -15,11 +15,14 @@ from tests.lab.hess.puck.rig import (
     Bench,
     PuckNode,
     bench,
+    loose,
+    n_memory_writes,
     open_link,
     release,
 )
 
-MODE, T, P = 8, 42, 48
+VERS, ROLE, STAT = 0, 1, 5
+MODE, T, MT, P, CTS, IPNM = 8, 42, 43, 48, 68, 86
 AT_90_DEG = 19251  # of 77004.8 counts in 360 deg
 
 
@@ -58,7 +61,26 @@ def position(one: Bench) -> int:
     return one.node.position(P, patience_s=0.001)[1]
 
 
+def angle_deg(one: Bench) -> float:
+    return degrees(one.emulator.motor.angle(one.clock.now_ns()))
+
+
 # Asleep and awake
+
+
+def test_it_starts_in_its_monitor_and_leaves_the_bus_while_it_wakes(on) -> None:
+    one = on(wake_s=0.01)
+    assert [one.node.get(number) for number in (STAT, VERS, ROLE)] == [0, 148, 0]
+    for number in (MODE, T, P, CTS, IPNM):  # asleep it answers nothing else
+        assert answers(one, 1, bytes((number,))) == []
+    told(one, (MODE, 2))
+    assert one.emulator.settings[-1].name == "LOCK"  # asleep 8 is not its mode
+    assert one.emulator.mode == 0
+    told(one, (STAT, 2), wait_s=0.009)
+    assert answers(one, 1, bytes((STAT,))) == []
+    assert one.emulator.n_disturbances == 1
+    assert told(one).node.get(STAT) == 2
+    assert position(one) == 0  # it counts from where the arm was when it was asleep
 
 
 # Answers
@@ -97,7 +119,26 @@ def test_it_holds_its_last_torque_for_ever_but_not_idle(on) -> None:
     told(one, (MODE, 2), (T, 144), wait_s=60.0)  # nobody says anything for a minute
     torque = one.emulator.motor.plant.motor_torque
     assert torque == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
-    assert degrees(one.emulator.motor.angle(one.clock.now_ns())) > 145.9
+    assert angle_deg(one) > 145.9
+
+
+def test_its_own_limit_clips_and_writes_of_its_memory_are_counted(on) -> None:
+    one = told(on(awake=True), (MT, 100), (MODE, 2), (T, 8000))
+    assert one.node.get(T) == 100
+    assert told(one, (T, -8000)).node.get(T) == -100
+    told(one, *((number, -1) for number in (30, 31, 32)))
+    assert n_memory_writes(one.emulator) == 3  # SAVE, LOAD, DEF
+
+
+def test_idle_it_brakes(on) -> None:
+    def coasted_deg(*settings: tuple[int, int]) -> float:
+        one = told(on(awake=True, hand=loose(45.0)), (MODE, 2), (T, 288), wait_s=0.1)
+        here = angle_deg(told(one, *settings))
+        one.node.wait(0.3)
+        return angle_deg(one) - here
+
+    # 0.06 kg·m² against B = 0.168 and β = 0.189, with or without 1 N·m·s/rad more
+    assert 0.0 < coasted_deg((T, 0), (MODE, 0)) < 0.3 * coasted_deg((T, 0))
 
 
 def test_the_babbling_of_others_is_bounded(on) -> None:

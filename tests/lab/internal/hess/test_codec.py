@@ -178,6 +178,38 @@ def test_counts_and_units_come_back_and_values_to_half_a_step(
     assert off <= puck.angle_step * (0.5 + 1e-9)
 
 
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("speed_deg_s", [15.0, 72.0, 120.0])
+def test_the_codec_changes_the_law_by_its_quantum(
+    model: str, speed_deg_s: float
+) -> None:
+    # The controller is fed the motion as the puck counts it, with the motion's own
+    # speed; what it asks for passes the bus. Against elbow.trace, which sees neither.
+    speed = math.radians(speed_deg_s)
+    motion = ConstantSpeed(start=START, end=END, speed=speed)
+    exact = trace(STANDARD_MODELS[model], motion, rate_hz=1000)
+    controller = controls(model, compensation=0.0)
+    sent = []
+    for time_s, angle, speed_now in zip(
+        exact.time.tolist(), exact.angle.tolist(), exact.velocity.tolist(), strict=True
+    ):
+        counts = decode_position(encode_position(PUCK.counts(angle)))
+        torque = controller.step(time_s, PUCK.angle(counts), speed_now)
+        _, units = decode_request(encode_value(42, PUCK.units(torque)))
+        sent.append((PUCK.torque(units), controller.phase))
+    torque, phases = np.array(sent).T
+    same = phases == exact.phase
+    assert np.sum(~same) <= 2  # a catch may begin or end one sample aside
+    # Half a unit of torque; and half a count of angle, which (5) feels three times, as
+    # the end of pre-catch by k, the start of post-catch and the angle now by k_post:
+    # 0.0035 N·m and 0.00004 rad * (3.15 + 2 * 5.8) N·m/rad = 0.0006 N·m
+    springs = 3.15 + 2.0 * 5.8
+    quantum = 0.5 * PUCK.torque_step + 0.5 * PUCK.angle_step * springs
+    # Where the catch or its end falls one sample later, what follows starts there.
+    aside = speed * 0.001 * springs if not same.all() else 0.0
+    assert np.max(np.abs(torque - exact.torque)[same]) <= quantum * (1 + 1e-9) + aside
+
+
 # The bus, against python-can itself at the other end
 
 
@@ -275,35 +307,3 @@ def test_the_kernel_is_asked_for_the_answers_of_one_puck_alone(
         "can_filters": filters if interface == "socketcan" else None,
         "ignore_config": True,
     }
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("speed_deg_s", [15.0, 72.0, 120.0])
-def test_the_codec_changes_the_law_by_its_quantum(
-    model: str, speed_deg_s: float
-) -> None:
-    # The controller is fed the motion as the puck counts it, with the motion's own
-    # speed; what it asks for passes the bus. Against elbow.trace, which sees neither.
-    speed = math.radians(speed_deg_s)
-    motion = ConstantSpeed(start=START, end=END, speed=speed)
-    exact = trace(STANDARD_MODELS[model], motion, rate_hz=1000)
-    controller = controls(model, compensation=0.0)
-    sent = []
-    for time_s, angle, speed_now in zip(
-        exact.time.tolist(), exact.angle.tolist(), exact.velocity.tolist(), strict=True
-    ):
-        counts = decode_position(encode_position(PUCK.counts(angle)))
-        torque = controller.step(time_s, PUCK.angle(counts), speed_now)
-        _, units = decode_request(encode_value(42, PUCK.units(torque)))
-        sent.append((PUCK.torque(units), controller.phase))
-    torque, phases = np.array(sent).T
-    same = phases == exact.phase
-    assert np.sum(~same) <= 2  # a catch may begin or end one sample aside
-    # Half a unit of torque; and half a count of angle, which (5) feels three times, as
-    # the end of pre-catch by k, the start of post-catch and the angle now by k_post:
-    # 0.0035 N·m and 0.00004 rad * (3.15 + 2 * 5.8) N·m/rad = 0.0006 N·m
-    springs = 3.15 + 2.0 * 5.8
-    quantum = 0.5 * PUCK.torque_step + 0.5 * PUCK.angle_step * springs
-    # Where the catch or its end falls one sample later, what follows starts there.
-    aside = speed * 0.001 * springs if not same.all() else 0.0
-    assert np.max(np.abs(torque - exact.torque)[same]) <= quantum * (1 + 1e-9) + aside

@@ -7,6 +7,7 @@ B > T / (2 (1 - cos ωT)) Re((1 - exp(-jωT)) H(exp(jωT))).
 
 import math
 from math import radians
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     Friction,
+    FrictionCompensation,
     SimulatedClock,
     SimulatedHand,
     TorqueSensor,
@@ -30,6 +33,7 @@ from masrel.lab.hess._simulated import (
 from tests.benchmarks.driver_integrators import by_solve_ivp, chosen, commands
 from tests.lab.hess.rig import MODELS, controls, stretching
 
+PAGE = (Path(__file__).parents[4] / "docs" / "driver.md").read_text(encoding="utf-8")
 STEP_NS = 500_000
 QUANTUM = 18.8 / 2700.0
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}
@@ -89,6 +93,17 @@ def test_the_motor_follows_after_its_delay_and_lag() -> None:
     assert found[5:] == pytest.approx(144 * QUANTUM * lags, rel=1e-9)
 
 
+def test_a_command_that_comes_during_the_delay_replaces_nothing() -> None:
+    plant = loose(step_ns=100_000, lag_time=0.0, torque_step=0.0)
+    plant.command(1.0, 0)
+    plant.command(2.0, 300_000)
+    seen = []
+    for tick in range(1, 12):
+        plant.advance(tick * 100_000)
+        seen.append(plant.motor_torque)
+    assert seen == [0.0] * 5 + [1.0] * 3 + [2.0] * 3
+
+
 # Friction
 
 
@@ -99,6 +114,22 @@ def test_it_sticks_until_the_torque_exceeds_the_coulomb_friction() -> None:
         plant.command(-tick * 1e-3, tick * 1_000_000)
         plant.advance((tick + 1) * 1_000_000)
         assert (plant.angle != 1.0) is (tick > 189)
+
+
+def test_a_sliding_arm_stops_when_its_energy_is_eaten_and_stays() -> None:
+    # It breaks away within a 1024th of a step, 0.5 µs, of the command: 1e-5 of 0.1 s.
+    # 0.5 I v² = β s: pushed with 1 N·m for 0.1 s. I = 0.06: v = (1 - 0.189) 0.1 / 0.06,
+    # 1.3517 rad/s; it slides on by 0.06 v² / (2 · 0.189) = 0.29002 rad.
+    plant = loose(friction=STICKY, **INSTANT)
+    plant.command(-1.0, 0)
+    plant.advance(100_000_000)
+    speed = (1.0 - 0.189) * 0.1 / 0.06
+    assert plant.velocity == pytest.approx(speed, rel=1e-5)
+    left = plant.angle
+    plant.command(0.0, 100_000_000)
+    plant.advance(1_000_000_000)
+    assert plant.angle - left == pytest.approx(0.06 * speed**2 / (2 * 0.189), rel=2e-5)
+    assert plant.velocity == 0.0
 
 
 # The torque sensor reads what mechanics says it must
@@ -167,9 +198,67 @@ def test_its_noise_and_its_steps_are_those_stated() -> None:
     assert abs(torques.mean()) < 4.0 * 0.02 / math.sqrt(4000.0)
 
 
+# The backdrivability test of Fig. 8: the torque a hand feels on the bare device
+
+TRAVEL = radians(100.0)
+DURATION = 1.7  # one way, s; the source prints no speed: within those of Table V
+
+
+class BackAndForth(SimulatedHand):
+    """A hand that goes forth and back by minimum jerk, peak speed 110 deg/s."""
+
+    def intended(self, time_s: float) -> tuple[float, float]:
+        trip, within = divmod(time_s, DURATION)
+        s = within / DURATION
+        shape = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        rate = 30.0 * s**2 * (1.0 - s) ** 2 / DURATION
+        if trip % 2:
+            return self.start + TRAVEL * (1.0 - shape), -TRAVEL * rate
+        return self.start + TRAVEL * shape, TRAVEL * rate
+
+
+def felt(share: float) -> list[float]:
+    # The hand's torque at every tick of two trips, N·m. As in (7), the moving mass
+    # is the motor's: the forearm hangs behind the sensor.
+    clock = SimulatedClock()
+    hand = BackAndForth(start=radians(35.0), end=radians(135.0), mean_speed=1.0)
+    bare = PlantParameters(arm_inertia=0.0)
+    device = SimulatedDevice(clock=clock, hand=hand, parameters=bare)
+    compensation = FrictionCompensation(Friction(), share=share)
+    estimate = VelocityEstimate()
+    torques = []
+    with device:
+        for tick in range(round(2e3 * DURATION)):
+            clock.sleep_until_ns(tick * 1_000_000)
+            velocity = estimate.update(tick * 1e-3, device.read().angle)
+            device.command(-compensation.torque(velocity))
+            torques.append(device._plant.hand_torque)
+    return torques
+
+
+def test_compensation_brings_what_equation_7_says_from_above_a_half_to_a_fifth() -> (
+    None
+):
+    # Peak speed 1.875 × 100 / 1.7 = 110.3 deg/s = 1.925 rad/s, without acceleration:
+    # 0.168 × 1.925 + 0.189 = 0.512 N·m, and the inertia adds a little before.
+    # The source: from above 0.5 to below 0.2 N·m. A compensation by speed cannot help
+    # an arm that sticks: at the reversal β = 0.189 N·m is left, and 0.009 N·m for
+    # inertia and the 5.6 ms by which the estimated speed comes late.
+    without, compensated = felt(0.0), felt(0.9)
+    peak = 0.168 * 1.875 * TRAVEL / DURATION + 0.189
+    assert max(without) == pytest.approx(peak, rel=0.05)
+    assert max(map(abs, without)) == pytest.approx(0.52, abs=0.005)  # as on the page
+    largest = max(range(len(compensated)), key=lambda tick: abs(compensated[tick]))
+    assert abs(compensated[largest]) == pytest.approx(0.198, abs=0.002)
+    assert largest * 1e-3 == pytest.approx(DURATION, abs=0.1)  # where it turns back
+    # In the middle of a trip: 0.1 × 0.512 = 0.051 N·m, the filter lags 5.6 ms.
+    assert compensated[round(500 * DURATION)] == pytest.approx(0.051, abs=0.005)
+
+
 # Whether the rendered joint can feed energy into a hand: the numbers of the page
 
 PERIOD = 0.001
+B = Friction().viscous
 
 
 def needed(
@@ -191,6 +280,27 @@ def needed(
     rendered = (stiffness + damping * speed) * motor
     bound = np.real((1.0 - back) * rendered) * PERIOD / (2.0 * (1.0 - back.real))
     return float(bound.max())
+
+
+def test_the_damping_that_the_page_says_is_needed() -> None:
+    model = STANDARD_MODELS["HM1"]
+    assert (model.damping, model.stiffness) == (1.26, 3.15)
+    # By hand, at the Nyquist rate: with the raw difference K T / 2 + b, with the
+    # filtered speed b g / (2 - g) + K T / 2 with g = 1 - exp(-0.18).
+    assert needed(cutoff=None) == pytest.approx(3.15 * 0.0005 + 1.26, rel=1e-6)
+    assert needed(cutoff=None) > 7.0 * B
+    gain = -math.expm1(-0.18)
+    assert needed() == pytest.approx(1.26 * gain / (2 - gain) + 3.15 * 0.0005, rel=1e-6)
+    assert needed() < B
+    assert needed(cutoff=260.0) < B < needed(cutoff=270.0)
+    late = {"delay": 0.0005, "lag": 0.0005}  # a delay of the motor takes that away
+    assert needed(**late) == pytest.approx(0.222, abs=0.0005)
+    assert needed(cutoff=120.0, **late) < B < needed(**late)
+    # The commanded part is b - 0.9 B; what the device keeps of its own is all of B.
+    assert needed(1.26 - 0.9 * B) == pytest.approx(0.101, abs=0.0005)
+    for words in ("1.262", "0.115", "0.222", "0.101"):
+        assert f"{words} N·m·s/rad" in PAGE
+    assert "260 rad/s" in PAGE
 
 
 @pytest.mark.parametrize(
@@ -225,30 +335,3 @@ def test_an_arm_that_nobody_holds_comes_to_rest(model: str, command_nm: float) -
     assert max(angles) - min(angles) > radians(1.0)  # it was moved
     assert len(set(angles[-1000:])) == 1
     assert abs(torque) <= Friction().coulomb
-
-
-def test_a_command_that_comes_during_the_delay_replaces_nothing() -> None:
-    plant = loose(step_ns=100_000, lag_time=0.0, torque_step=0.0)
-    plant.command(1.0, 0)
-    plant.command(2.0, 300_000)
-    seen = []
-    for tick in range(1, 12):
-        plant.advance(tick * 100_000)
-        seen.append(plant.motor_torque)
-    assert seen == [0.0] * 5 + [1.0] * 3 + [2.0] * 3
-
-
-def test_a_sliding_arm_stops_when_its_energy_is_eaten_and_stays() -> None:
-    # It breaks away within a 1024th of a step, 0.5 µs, of the command: 1e-5 of 0.1 s.
-    # 0.5 I v² = β s: pushed with 1 N·m for 0.1 s. I = 0.06: v = (1 - 0.189) 0.1 / 0.06,
-    # 1.3517 rad/s; it slides on by 0.06 v² / (2 · 0.189) = 0.29002 rad.
-    plant = loose(friction=STICKY, **INSTANT)
-    plant.command(-1.0, 0)
-    plant.advance(100_000_000)
-    speed = (1.0 - 0.189) * 0.1 / 0.06
-    assert plant.velocity == pytest.approx(speed, rel=1e-5)
-    left = plant.angle
-    plant.command(0.0, 100_000_000)
-    plant.advance(1_000_000_000)
-    assert plant.angle - left == pytest.approx(0.06 * speed**2 / (2 * 0.189), rel=2e-5)
-    assert plant.velocity == 0.0
