@@ -41,7 +41,7 @@ from masrel.judges import (
     score_test,
 )
 from masrel.ratings import RatingsFile
-from masrel.ratings._doubts import called_gold
+from masrel.ratings._doubts import called_gold, called_model
 
 _Grades = dict[str, Any]  # by item
 
@@ -190,7 +190,12 @@ def _roles(
                 called_gold(name),
                 f"--humans: {name!r} reads like a gold standard, which is no human: "
                 f"--reference {name} holds it apart; if it is one, --humans names all",
-            )
+            ),
+            (
+                called_model(name),
+                f"--humans: {name!r} reads like a model, which is no human: --judge "
+                f"{name} judges it, too; --humans names all who are humans",
+            ),
         )
     return judges, humans
 

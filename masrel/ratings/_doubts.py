@@ -341,6 +341,17 @@ def called_gold(name: str) -> bool:
     return _is_sum(_words(name)) or bool(_words(name) & _SURE)
 
 
+# names of language models; Claude is a person, too, unless a version follows
+_MODELS = re.compile(
+    r"gpt|llama|gemini|mi[sx]tral|qwen|deepseek|llm|(claude|gemma|phi)[-_ ]?\w*\d"
+)
+
+
+def called_model(name: str) -> bool:
+    """Return whether a name is that of a language model."""
+    return _MODELS.search(name.lower()) is not None
+
+
 def _words(name: str) -> set[str]:
     parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
     return set(re.findall(r"[^\W\d_]+|\d+", parts))
