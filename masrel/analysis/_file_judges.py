@@ -89,8 +89,13 @@ def _answers(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     rows: dict[str, list[tuple[Row, Row]]] = {}
     who: dict[str, None] = {}
     for part, group, keys in _parts(file, questions, judging):
-        roles = {"judges": listed(part.judges), "humans": listed(part.humans)}
-        who[note("roles", **{role: of or "none" for role, of in roles.items()})] = None
+        who[
+            note(
+                "roles",
+                judges=listed(part.judges) or "none",
+                humans=listed(part.humans) or "none",
+            )
+        ] = None
         for make in compress(is_asked, is_asked.values()):
             with placed(file.read["file"], group):
                 for name, row, cells in make(part):
@@ -254,11 +259,14 @@ def _beside_humans(part: _Part) -> _Made:
             if part.clusters is None:  # else it would be too short
                 ends = score_test(human.b, human.c, human.n_items, level=level)
                 row |= {"difference_low": ends.low, "difference_high": ends.high}
-            cells = {
-                "title": f"{human.name}, {judge}",
-                "not_worse": _YES[human.is_rejected],
-            }
-            yield "humans", row, cells
+            yield (
+                "humans",
+                row,
+                {
+                    "title": f"{human.name}, {judge}",
+                    "not_worse": _YES[human.is_rejected],
+                },
+            )
 
 
 def _how(part: _Part) -> dict[str, Any]:
@@ -266,9 +274,10 @@ def _how(part: _Part) -> dict[str, Any]:
     judging, score = part.judging, part.judging.score
     if score != "accuracy":
         check_order(part.file, f"--score {score}")
-    is_name = score in ("accuracy", "neg_rmse")
     return {
-        "score": score if is_name else (score, part.file.scale.values),
+        "score": score
+        if score in ("accuracy", "neg_rmse")
+        else (score, part.file.scale.values),
         "min_items": judging.min_items,
         "clusters": part.clusters,
     }
