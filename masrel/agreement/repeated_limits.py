@@ -224,14 +224,6 @@ def limits_with_repeats(
     repeats = [_cells(codes, of, len(items))[:, chosen] for of in rows]
     within, parts = zip(*map(_within, repeats), strict=True)
     between = math.nan if reason else n * float(residuals.var()) / df
-    # where repeats make items' mean differences vary so unequally, by the SD of what
-    # they add to the variance, intervals of 95 % held the limits in less than 93 %
-    is_uneven = n > 1 and bool(
-        np.sum(
-            [s2 / of[0] for s2, of in zip(within, repeats, strict=True)], axis=0
-        ).std()
-        > 0.6 * between
-    )
     nothing = Interval(
         low=math.nan,
         high=math.nan,
@@ -239,13 +231,7 @@ def limits_with_repeats(
         kind="confidence",
         method="MOVER",
         target="items",
-        notes=(
-            _Caution(
-                "numbers of repeats differ much from item to item: it may hold the "
-                "limit less often than it says"
-            ),
-        )
-        * is_uneven,
+        notes=_cautions(within, repeats, between),
     )
     result = _ended(
         RepeatedLimits(
@@ -287,6 +273,23 @@ def _values(data: Any, name: str, kind: _LimitsKind) -> Floats:
         error=RatingsError,
     )
     return np.log(values) if kind == "ratio" else values
+
+
+def _cautions(
+    within: Sequence[float], repeats: Sequence[Floats], between: float
+) -> tuple[_Caution, ...]:
+    """Return what to say where numbers of repeats differ much."""
+    added = [s2 / of[0] for s2, of in zip(within, repeats, strict=True)]
+    # where repeats make items' mean differences vary so unequally, by the SD of what
+    # they add to the variance, intervals of 95 % held the limits in less than 93 %
+    if len(added[0]) < 2 or not np.sum(added, axis=0).std() > 0.6 * between:
+        return ()
+    return (
+        _Caution(
+            "numbers of repeats differ much from item to item: it may hold the limit "
+            "less often than it says"
+        ),
+    )
 
 
 def _slope(averages: Floats, differences: Floats) -> tuple[float, float, str | None]:

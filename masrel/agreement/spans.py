@@ -322,22 +322,7 @@ def _laid(
     observer, of_document = observer[rows], of_document[rows]
     of_category, categories = coded(names[2], "category")
     limits = [_MOST - 1 if lengths is None else lengths.get(of) for of in documents]
-    wrong = [
-        number
-        for fewest, of in ((1, limits), (1 - _MOST, [begin, *starts, *sizes]))
-        for number in of
-        if not isinstance(number, int | float | np.integer)
-        or number % 1
-        or not fewest <= number < _MOST
-    ]
-    refuse(
-        (
-            wrong,
-            f"begin, length: needs whole numbers below {_MOST}, and a length of each "
-            f"document of at least 1, got {shown(next(iter(wrong), None))}",
-        ),
-        error=RatingsError,
-    )
+    _check_whole(limits, [begin, *starts, *sizes])
     first, size, room = (np.array(of, dtype=np.int64) for of in (starts, sizes, limits))
     place = (of_category * len(documents) + of_document) * _MOST + first - begin
     order = np.lexsort((place, observer))
@@ -345,19 +330,11 @@ def _laid(
     crosses = np.flatnonzero(
         (np.diff(observer[order]) == 0) & (np.diff(place[order]) < size[order[:-1]])
     )[:1]
-    for bad, needed in (
+    _check_spans(
+        [*names, starts, sizes],
         (np.flatnonzero(outside)[:1], "to end after they begin, within the document"),
         (order[[*crosses, *crosses + 1]], "of an observer and a category to lie apart"),
-    ):
-        spans = [
-            f"{listed(repr(of[k]) for of in names if of[k] != '')} from {starts[k]} to "
-            f"{starts[k] + sizes[k]}"
-            for k in bad
-        ]
-        refuse(
-            (spans, f"spans: needs spans {needed}, got {' and '.join(spans)}"),
-            error=RatingsError,
-        )
+    )
     is_there &= is_there.sum(axis=0) > 1
     refuse(
         (
@@ -376,6 +353,41 @@ def _laid(
         place=place[order],
         size=size[order],
     )
+
+
+def _check_whole(lengths: list[Any], others: list[Any]) -> None:
+    """Refuse numbers that are not whole or too large, and lengths below 1."""
+    wrong = [
+        number
+        for fewest, of in ((1, lengths), (1 - _MOST, others))
+        for number in of
+        if not isinstance(number, int | float | np.integer)
+        or number % 1
+        or not fewest <= number < _MOST
+    ]
+    refuse(
+        (
+            wrong,
+            f"begin, length: needs whole numbers below {_MOST}, and a length of each "
+            f"document of at least 1, got {shown(next(iter(wrong), None))}",
+        ),
+        error=RatingsError,
+    )
+
+
+def _check_spans(columns: list[list[Any]], *rules: tuple[Integers, str]) -> None:
+    """Refuse the spans that break a rule, by what is needed of them."""
+    *names, starts, sizes = columns
+    for bad, needed in rules:
+        spans = [
+            f"{listed(repr(of[k]) for of in names if of[k] != '')} from {starts[k]} to "
+            f"{starts[k] + sizes[k]}"
+            for k in bad
+        ]
+        refuse(
+            (spans, f"spans: needs spans {needed}, got {' and '.join(spans)}"),
+            error=RatingsError,
+        )
 
 
 # -- disagreements ---------------------------------------------------------------------

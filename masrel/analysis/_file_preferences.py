@@ -36,31 +36,12 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
             for judge in judges
         )
     )
-    biases: list[Row] = []
-    strengths: list[Row] = []
-    for judge in judges or list(verdicts):
-        with placed(file.read["file"], judge):
-            bias = position_bias(verdicts[judge], tie=tie, level=questions.level)
-            fit = bradley_terry(verdicts[judge], tie=tie, level=questions.level)
-        biases.append(
-            {
-                "judge": judge,
-                **{of: getattr(bias, of) for of in _OF_BIAS},
-                "p_value": bias.mcnemar.p_value,
-                "notes": bias.notes,
-            }
-        )
-        numbers = np.array([fit.strengths, fit.low, fit.high]).T.tolist()
-        strengths += [
-            {
-                "judge": judge,
-                "model": model,
-                **dict(zip(("value", "low", "high"), of_model, strict=True)),
-                "reason": fit.reason,
-                "notes": fit.notes,
-            }
-            for model, of_model in zip(fit.models, numbers, strict=True)
-        ]
+    found = [
+        _of_judge(file, judge, verdicts[judge], tie, questions.level)
+        for judge in judges or list(verdicts)
+    ]
+    biases = [bias for bias, _ in found]
+    strengths = [row for _, rows in found for row in rows]
     for name, kind, rows in (
         ("preferences", "position", biases),
         ("strengths", "strengths", strengths),
@@ -80,6 +61,32 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
                 ),
             ),
         )
+
+
+def _of_judge(
+    file: RatingsFile, judge: str, verdicts: list[_Verdict], tie: str, level: float
+) -> tuple[Row, list[Row]]:
+    """Return the row of a judge's leaning to a place, and those of its strengths."""
+    with placed(file.read["file"], judge):
+        bias = position_bias(verdicts, tie=tie, level=level)
+        fit = bradley_terry(verdicts, tie=tie, level=level)
+    leaning = {
+        "judge": judge,
+        **{of: getattr(bias, of) for of in _OF_BIAS},
+        "p_value": bias.mcnemar.p_value,
+        "notes": bias.notes,
+    }
+    numbers = np.array([fit.strengths, fit.low, fit.high]).T.tolist()
+    return leaning, [
+        {
+            "judge": judge,
+            "model": model,
+            **dict(zip(("value", "low", "high"), of_model, strict=True)),
+            "reason": fit.reason,
+            "notes": fit.notes,
+        }
+        for model, of_model in zip(fit.models, numbers, strict=True)
+    ]
 
 
 def _texts(row: Row) -> list[str]:
