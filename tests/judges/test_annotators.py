@@ -260,6 +260,15 @@ def test_what_is_undefined_is_no_rejection() -> None:
     assert result.humans[0].reason is not None
 
 
+def test_half_of_the_humans_is_enough_to_pass() -> None:
+    # the judge repeats human 2, so it is never worse than human 1, who differs on 20
+    # items of 40, and always ties with human 2, which does not show 1 in 100
+    one, two = ({i: "ab"[i % of] for i in range(40)} for of in (2, 1))
+    result = alternative_annotator_test({"1": one, "2": two}, two, epsilon=0.01)
+    assert [(human.b, human.c) for human in result.humans] == [(0, 20), (0, 0)]
+    assert (result.winning_rate, result.is_passed) == (0.5, True)
+
+
 def test_advised_bounds_are_those_of_the_paper() -> None:
     assert EPSILONS == {"expert": 0.2, "skilled": 0.15, "crowd": 0.1}
 
