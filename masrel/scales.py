@@ -153,7 +153,7 @@ class PublishedScale:
 
 
 # Nobody is known to have licensed the original wordings to everybody, so that none of
-# them stands here; docs/scales.md says more.
+# them stands here; docs/reference/scales.md says more.
 _TARDIEU_MEANINGS = MappingProxyType(
     {
         "0": "nothing resists anywhere along the movement",

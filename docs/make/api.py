@@ -1,6 +1,6 @@
 """The page of everything that is exported, from ``__all__`` and first lines.
 
-``python -m docs.make.api`` writes ``docs/api.md``.
+``python -m docs.make.api`` writes ``docs/reference/api.md``.
 """
 
 import ast
@@ -9,7 +9,7 @@ import inspect
 from itertools import pairwise
 from pathlib import Path
 
-PAGE = Path(__file__).parents[1] / "api.md"
+PAGE = Path(__file__).parents[1] / "reference" / "api.md"
 MODULES = (
     "masrel",
     "masrel.agreement",

@@ -1,4 +1,4 @@
-"""The figure of docs/agreement/diagnosis.md, of eight simulated raters.
+"""The figure of docs/howto/diagnosis.md, of eight simulated raters.
 
 ``python -m docs.make.diagnosis`` draws it.
 """

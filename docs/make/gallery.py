@@ -1,4 +1,4 @@
-"""The pictures of docs/gallery.md, made by the lines of that page itself.
+"""The pictures of docs/howto/gallery.md, made by the lines of that page itself.
 
 ``python -m docs.make.gallery`` runs the page and writes each picture that it shows,
 docs/figures/gallery_NAME.png: the figure of pyplot that the blocks above it have made,
@@ -16,7 +16,7 @@ from docs.make.pages import ROOT, read, run
 from tests.lab.serve.browser.conftest import CHROMIUM, FLAGS
 
 FIGURES = ROOT / "docs" / "figures"
-PAGE = ROOT / "docs" / "gallery.md"
+PAGE = ROOT / "docs" / "howto" / "gallery.md"
 SIZE = {"width": 1060, "height": 985}  # of the window, as wide as what is read
 
 

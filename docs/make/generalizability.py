@@ -1,7 +1,7 @@
 """How often intervals of a generalizability study hold the truth, and its picture.
 
 ``python -m docs.make.generalizability`` writes a section of
-``docs/agreement/generalizability.md`` and ``docs/figures/gstudy.png``.
+``docs/reference/coefficients/generalizability.md`` and ``docs/figures/gstudy.png``.
 """
 
 import json
@@ -18,7 +18,8 @@ from masrel.plots import draw
 from masrel.tables._decision_tables import study_curves
 
 DOCS = Path(__file__).parents[1]
-PAGE, FIGURE = DOCS / "agreement" / "generalizability.md", DOCS / "figures/gstudy.png"
+PAGE = DOCS / "reference" / "coefficients" / "generalizability.md"
+FIGURE = DOCS / "figures" / "gstudy.png"
 ORACLE = DOCS.parent / "tests" / "oracles" / "generalizability.json"
 BEGIN, END = "<!-- coverage -->\n", "<!-- end of the coverage -->\n"
 

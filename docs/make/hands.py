@@ -1,4 +1,4 @@
-"""What docs/driver.md says of people's hands: its table and its figure.
+"""What docs/explanation/driver.md says of people's hands: its table and its figure.
 
 ``python -m docs.make.hands [HANDS]`` prints the table and draws the figure; a thousand
 hands take some minutes.

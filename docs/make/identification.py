@@ -1,4 +1,4 @@
-"""What docs/identification.md shows: its figures, its table of coverage, its time.
+"""What the page of identification shows: its figures, its table of coverage, its time.
 
 python -m docs.make.identification figures
 python -m docs.make.identification coverage [STUDIES]

@@ -1,7 +1,7 @@
 """How often tests of a judge reject what is true, and what is not.
 
-``python -m docs.make.judge_levels`` writes ``docs/judges_levels.csv``, its section of
-``docs/judges_evidence.md`` and ``docs/figures/judges_levels.png``.
+``python -m docs.make.judge_levels`` writes ``docs/evidence/judges_levels.csv``, its
+section of ``docs/evidence/judges.md`` and ``docs/figures/judges_levels.png``.
 """
 
 import csv
@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 DOCS = Path(__file__).parents[1]
-ROWS, PAGE = DOCS / "judges_levels.csv", DOCS / "judges_evidence.md"
+ROWS, PAGE = DOCS / "evidence/judges_levels.csv", DOCS / "evidence/judges.md"
 FIGURE = DOCS / "figures" / "judges_levels.png"
 BEGIN, END = "<!-- levels -->\n", "<!-- end of the levels -->\n"
 COLUMNS = ("what", "n", "test", "bound", "epsilon", "of", "percent")
@@ -237,7 +237,7 @@ differ on 10 % or 40 % of the items.
 
 {sizes}
 
-![True hypotheses rejected, and judges that pass wrongly](figures/judges_levels.png)
+![True hypotheses rejected, and judges that pass wrongly](../figures/judges_levels.png)
 
 A judge passes if at least half of the humans' hypotheses are rejected. Below, all
 humans grade the same items, are right on 97 % of them, and are all better by just an

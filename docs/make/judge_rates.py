@@ -1,7 +1,8 @@
 """How often intervals of a judge's rates hold the true one.
 
-``python -m docs.make.judge_rates`` draws studies and writes ``docs/judges_rates.csv``,
-its section of ``docs/judges_evidence.md`` and ``docs/figures/judges_rates.png``.
+``python -m docs.make.judge_rates`` draws studies and writes
+``docs/evidence/judges_rates.csv``, its section of ``docs/evidence/judges.md`` and
+``docs/figures/judges_rates.png``.
 """
 
 import csv
@@ -28,7 +29,7 @@ Cell = tuple[Any, ...]
 Row = dict[str, Any]
 
 DOCS = Path(__file__).parents[1]
-ROWS, PAGE = DOCS / "judges_rates.csv", DOCS / "judges_evidence.md"
+ROWS, PAGE = DOCS / "evidence/judges_rates.csv", DOCS / "evidence/judges.md"
 FIGURE = DOCS / "figures" / "judges_rates.png"
 BEGIN, END = "<!-- rates -->\n", "<!-- end of the rates -->\n"
 
@@ -240,7 +241,7 @@ and .6.
   of items that pass or that fail. With so few it may hold the rate in less than 93 %.
 - The naive interval is that of the judge's own rate.
 
-![Coverage by the number of labels](figures/judges_rates.png)
+![Coverage by the number of labels](../figures/judges_rates.png)
 """
 _ABOUT_GRADES = """
 Grades that are numbers have no ends that are known, so that nothing is padded: the

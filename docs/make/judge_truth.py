@@ -1,7 +1,7 @@
 """Dawid and Skene's model on simulated ratings: coverage of its intervals, recovery.
 
-``python -m docs.make.judge_truth`` writes ``docs/judges_truth.csv``, and its section of
-``docs/judges_evidence.md``; it takes some ten minutes.
+``python -m docs.make.judge_truth`` writes ``docs/evidence/judges_truth.csv``, and its
+section of ``docs/evidence/judges.md``; it takes some ten minutes.
 """
 
 import csv
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from masrel.judges import dawid_skene_intervals
 
 DOCS = Path(__file__).parents[1]
-TABLE, PAGE = DOCS / "judges_truth.csv", DOCS / "judges_evidence.md"
+TABLE, PAGE = DOCS / "evidence/judges_truth.csv", DOCS / "evidence/judges.md"
 BEGIN, END = "<!-- truth -->\n", "<!-- end of the truth -->\n"
 N_SETS, N_RESAMPLES, SEED = 500, 640, 39
 # items of which a share is hard: raters are wrong there in 7 of 10 grades, together

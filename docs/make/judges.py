@@ -1,4 +1,4 @@
-"""The figures of docs/judges.md, of the files that the page makes.
+"""The figures of docs/howto/judges.md, of the files that the page makes.
 
 ``python -m docs.make.judges`` draws them.
 """
@@ -23,7 +23,7 @@ CALLS = {
 
 def draw() -> None:
     """Write the files of the blocks of Python, and draw what is shown of them."""
-    page = (ROOT / "docs" / "judges.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/howto/judges.md").read_text(encoding="utf-8")
     blocks = (of for of in read(page) if of.language == "python")
     lines = ["\n".join(of.lines) for of in blocks if ".csv" in "".join(of.lines)]
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):

@@ -1,7 +1,8 @@
 """How often intervals of limits of agreement with repeats hold the true ones.
 
-``python -m docs.make.limits`` draws studies and writes ``docs/limits_coverage.csv``,
-its section of ``docs/agreement/limits_with_repeats.md``, and the figure of that page.
+``python -m docs.make.limits`` draws studies and writes
+``docs/evidence/limits_coverage.csv``, its section of
+``docs/reference/coefficients/limits_with_repeats.md``, and the figure of that page.
 """
 
 import csv
@@ -21,7 +22,8 @@ from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 
 DOCS = Path(__file__).parents[1]
-ROWS, PAGE = DOCS / "limits_coverage.csv", DOCS / "agreement" / "limits_with_repeats.md"
+ROWS = DOCS / "evidence" / "limits_coverage.csv"
+PAGE = DOCS / "reference" / "coefficients" / "limits_with_repeats.md"
 FIGURE = DOCS / "figures" / "limits_with_repeats.png"
 BEGIN, END = "<!-- coverage -->\n", "<!-- end of the coverage -->\n"
 COLUMNS = ("limits", "repeats", "n_items", "errors", "quantity", "n_studies", "n_held")

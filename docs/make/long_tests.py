@@ -1,8 +1,9 @@
 """The page of the last run by hand of every slow and long test.
 
 ``python -m docs.make.long_tests JUNIT_XML`` writes the table of tests on
-``docs/long_tests.md``, and the counts of injected faults there and into
-``docs/record.md``; ``python -m tests.mutants`` the table of deliberate faults.
+``docs/development/long_tests.md``, and the counts of injected faults there and into
+``docs/explanation/record.md``; ``python -m tests.mutants`` the table of deliberate
+faults.
 """
 
 import subprocess
@@ -13,8 +14,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree
 
-PAGE = Path(__file__).parents[1] / "long_tests.md"
-RECORD = Path(__file__).parents[1] / "record.md"
+PAGE = Path(__file__).parents[1] / "development" / "long_tests.md"
+RECORD = Path(__file__).parents[1] / "explanation" / "record.md"
 TESTS = "<!-- table of tests -->\n", "<!-- end of the tests -->\n"
 FAULTS = "<!-- counts of faults -->\n", "<!-- end of the counts -->\n"
 MUTANTS = "<!-- deliberate faults -->\n", "<!-- end of the deliberate faults -->\n"

@@ -1,9 +1,9 @@
 """The page of other programs: ``python -m docs.make.peers``, of `.ci/long`.
 
-Writes ``docs/peers.md``: ten files through masrel, Python's irrCAC, krippendorff,
-pingouin, statsmodels and scikit-learn (the extra `peers`) and R's psych, vcd and lme4
-(`peers.R`, where R is there), value by value. A difference that nothing here explains
-ends the program; an explanation of nothing is left out.
+Writes ``docs/evidence/peers.md``: ten files through masrel, Python's irrCAC,
+krippendorff, pingouin, statsmodels and scikit-learn (the extra `peers`) and R's psych,
+vcd and lme4 (`peers.R`, where R is there), value by value. A difference that nothing
+here explains ends the program; an explanation of nothing is left out.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ import masrel
 from masrel.agreement import COEFFICIENTS
 
 DOCS = Path(__file__).parents[1]
-PAGE = DOCS / "peers.md"
+PAGE = DOCS / "evidence" / "peers.md"
 ORACLES = DOCS.parent / "tests" / "oracles" / "agreement.json"
 R_PROGRAM = Path(__file__).with_suffix(".R")
 QUANTITIES = {"value": "", "error": ", SE", "low": ", low", "high": ", high"}
@@ -640,12 +640,12 @@ def opening(comparisons: list[Comparison], versions: Mapping[str, str]) -> list[
         f"{len(comparisons) - len(whys)} are ours, but for the last digits of floats, "
         "or as far as they are computed (psych and lme4 by steps, 5 · 10⁻⁶) or printed "
         f"(pingouin's ends, two decimals). {n_again} are had again by "
-        "[`--convention`](coming_from.md#old-numbers-had-again), which is checked; the "
-        "others are explained [below](#why).",
+        "[`--convention`](../howto/coming_from.md#old-numbers-had-again), which is "
+        "checked; the others are explained [below](#why).",
         'masrel\'s are those of `masrel.agree(file, target="items")` with the declared '
         'categories and `Estimating(interval="analytic")`, whose t is also irrCAC\'s; '
         "ICC has the interval of its form. What masrel chooses by itself is [another "
-        "interval](intervals.md), and often a better one.",
+        "interval](../explanation/intervals.md), and often a better one.",
     )
     title = "# The same files through other programs"
     return [

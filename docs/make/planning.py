@@ -1,6 +1,6 @@
 """The page of what came true of plans: ``python -m docs.make.planning``.
 
-Writes ``docs/planning_designs.md`` and ``docs/figures/planning_error.png``: designs
+Writes ``docs/evidence/planning.md`` and ``docs/figures/planning_error.png``: designs
 that were planned and then simulated anew with another seed, formulas beside them,
 presize and kappaSize beside, and how Monte Carlo error falls with time.
 """
@@ -17,7 +17,8 @@ from masrel.planning._studies import numbers_of, simulated
 from masrel.planning._truth import design_of
 
 DOCS = Path(__file__).parents[1]
-PAGE, FIGURE = DOCS / "planning_designs.md", DOCS / "figures" / "planning_error.png"
+PAGE = DOCS / "evidence" / "planning.md"
+FIGURE = DOCS / "figures" / "planning_error.png"
 ORACLE = DOCS.parent / "tests" / "oracles" / "planning.json"
 TWO, THREE, FOUR = [0.7, 0.3], [0.5, 0.3, 0.2], [0.4, 0.3, 0.2, 0.1]
 
@@ -287,7 +288,8 @@ def main() -> None:
             [
                 "# What came true of plans",
                 "",
-                "Made by `python -m docs.make.planning`. [Planning](planning.md) says "
+                "Made by `python -m docs.make.planning`. "
+                "[Planning](../howto/planning.md) says "
                 "what each thing is.",
                 "",
                 "## Twenty designs",
@@ -326,7 +328,8 @@ def main() -> None:
                 "",
                 "## Time and error",
                 "",
-                "![Monte Carlo error over processor time](figures/planning_error.png)",
+                "![Monte Carlo error over processor time]"
+                "(../figures/planning_error.png)",
                 "",
             ]
         ),

@@ -1,4 +1,4 @@
-"""The figures of docs/serving.md: both pages of a simulated session, in Chromium.
+"""The figures of the page of ``masrel serve``: both sides of a session, in Chromium.
 
 ``python -m docs.make.serving`` writes docs/figures/serve_rater.png and
 docs/figures/serve_coordinator.png.

@@ -1,4 +1,4 @@
-"""What docs/tone.md says of tone in people's hands: its table and its figure.
+"""What docs/reference/tone says of tone in people's hands: its table and its figure.
 
 ``python -m docs.make.tone_hands [HANDS]`` draws the figure and prints the table; a
 hundred hands of each kind take some ten minutes.

@@ -1,4 +1,4 @@
-"""What docs/training.md says of the test of a training, measured on simulated trainees.
+"""What the page of training says of its test, measured on simulated trainees.
 
 ``python -m docs.make.training [TRAINEES]`` prints the tables; 4 000 trainees of each
 kind take some ten minutes.

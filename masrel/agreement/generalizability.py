@@ -34,8 +34,9 @@ _Method = Literal["ANOVA", "REML", "moments"]
 
 _RESIDUAL = "residual"  # what no effect explains, where cells have several ratings
 
-# Degrees of freedom of the residual below which docs/agreement/generalizability.md
-# has intervals that hold the truth less often than they say
+# Degrees of freedom of the residual below which
+# docs/reference/coefficients/generalizability.md has intervals that hold the truth less
+# often than they say
 _FEW, _FEW_RATINGS = 10, "few ratings: intervals may hold the truth less often"
 _MOST_DENSE = 5000  # levels of the effects that are not of the largest column
 

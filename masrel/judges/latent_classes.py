@@ -38,7 +38,7 @@ _NO_ITEM = 1e-6  # ratings of a class below which a rater has met none of it
 _SMALLEST = 1e-300  # probability, so that the logarithm of 0 is a number
 _PRIOR, _PRIOR_RIGHT = 0.5, 1.0  # of each cell, and so much more of the right one
 _MANY_SWITCHED = 0.01  # share of draws
-_CERTAIN = 0.87  # mean probability of an item's class; see docs/judges_evidence.md
+_CERTAIN = 0.87  # mean probability of an item's class; see docs/evidence/judges.md
 _N_CHAINS, _BURN_IN = 16, 100
 
 
@@ -463,8 +463,8 @@ def dawid_skene_intervals(
     1, so is that end of its interval. A bootstrap of items covers less: it has no
     spread in an empty cell.
 
-    Raters who err together make them too short; docs/judges_and_truth.md shows by how
-    much.
+    Raters who err together make them too short; docs/explanation/judges_and_truth.md
+    shows by how much.
 
     References
     ----------

@@ -32,7 +32,7 @@ _ASSUMPTIONS: dict[_RateMethod, _Assumption] = {
     "labels_alone": "labels_are_random",
 }
 
-# Coverage below 93 % was met only with fewer: docs/judges_evidence.md
+# Coverage below 93 % was met only with fewer: docs/evidence/judges.md
 _ENOUGH = {"labels": 10, "numbers": 50, "z": 200, "of_both_kinds": 20, "of_a_kind": 5}
 
 # Why an interval lies below 0, or above 1

@@ -1,7 +1,8 @@
 """The session log: a chain of events, each on disk before anything follows.
 
-Every line carries the hash of the line before. ``docs/session_log.md`` has the format,
-how to verify it without masrel, and what happens after a crash.
+Every line carries the hash of the line before.
+``docs/reference/formats/session_log.md`` has the format, how to verify it without
+masrel, and what happens after a crash.
 """
 
 import errno

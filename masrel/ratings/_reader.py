@@ -168,9 +168,9 @@ def read_ratings(
     ----------
     data : Path, str, DataFrame, dict of columns or array_like
         The path of a file; "-" is standard input. Text, workbooks, Parquet, Feather,
-        JSON, SPSS, Stata and SAS, packed or not; ``docs/ratings.md`` has every shape.
-        Or a table: a DataFrame of pandas or polars, a table of Arrow, a relation of
-        DuckDB, columns by name, or rows without names.
+        JSON, SPSS, Stata and SAS, packed or not; ``docs/reference/formats/ratings.md``
+        has every shape. Or a table: a DataFrame of pandas or polars, a table of Arrow,
+        a relation of DuckDB, columns by name, or rows without names.
     reading : Reading, optional
         How it is read; the file tells what is not given.
     progress : callable, optional

@@ -19,7 +19,7 @@ from docs.make.api import MODULES
 # No examples or cross-references are forced on a class of data (EX01, SA01), a summary
 # of one line may be all (ES01), it begins on the first line (GL01), and what a function
 # returns has no name (RT02).
-PROTOCOL_PAGE = Path(__file__).parents[2] / "docs" / "protocol.md"
+PROTOCOL_PAGE = Path(__file__).parents[2] / "docs/reference/protocol.md"
 MADE_BY_A_METHOD = {"masrel.lab.run.SessionLog"}  # never called: its `open` is
 LEFT_OUT = {"EX01", "SA01", "ES01", "GL01", "GL08", "RT02"}
 

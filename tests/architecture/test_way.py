@@ -1,4 +1,4 @@
-"""The ways of a rating and of a presentation that docs/architecture.md tells."""
+"""The ways of a rating and of a presentation in docs/development/architecture.md."""
 
 import re
 import sys
@@ -11,7 +11,7 @@ import masrel
 from tests.cli.process import Caller
 
 ROOT = Path(masrel.__file__).parent
-PAGE = (ROOT.parent / "docs" / "architecture.md").read_text("utf-8")
+PAGE = (ROOT.parent / "docs/development/architecture.md").read_text("utf-8")
 STOP = re.compile(r"^\| \d+ \| `([\w/]+\.py)` \| `([\w.]+)` \|", re.MULTILINE)
 GRADES = ("1 1 2", "0 0 0", "2 2 2", "3 2 3", "1 1 1", "0 1 0") * 2
 

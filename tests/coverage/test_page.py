@@ -5,17 +5,17 @@ from dataclasses import replace
 import pytest
 from scipy.stats import fisher_exact
 
-from docs.make.coverage.__main__ import DOCS, studies
+from docs.make.coverage.__main__ import EVIDENCE, studies
 from docs.make.coverage.page import page, read
 
 KEY = ["study", "family", "population", "n_items", "n_raters", "coefficient", "method"]
-ROWS = read(DOCS / "coverage.csv")
+ROWS = read(EVIDENCE / "coverage.csv")
 OTHER_SEED = 7
 FALSE_ALARM = 1e-6  # of one of the 220 comparisons of the long test: 2 in 10^4 runs
 
 
 def test_the_page_is_made_from_its_rows() -> None:
-    assert page(DOCS) == (DOCS / "coverage.md").read_text(encoding="utf-8")
+    assert page(EVIDENCE) == (EVIDENCE / "coverage.md").read_text(encoding="utf-8")
 
 
 def test_every_cell_has_a_row() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[2] / "docs" / "ci.md"
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "ci.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 
 

@@ -40,6 +40,6 @@ def test_every_file_and_heading_that_a_page_points_to_is_there(name: str) -> Non
 
 
 def test_every_picture_is_in_the_gallery() -> None:
-    files = {file for file, _ in links(PAGES["docs/gallery.md"])}
-    names = {f"figures/gallery_{name}.png" for name in plots.__all__}
-    assert names - files == {"figures/gallery_draw.png"}
+    files = {file for file, _ in links(PAGES["docs/howto/gallery.md"])}
+    names = {f"../figures/gallery_{name}.png" for name in plots.__all__}
+    assert names - files == {"../figures/gallery_draw.png"}

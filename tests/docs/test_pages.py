@@ -30,46 +30,46 @@ BLOCKS = [block for name, text in TEXTS.items() for block in read(text, name)]
 
 # They take from three seconds to half a minute.
 SLOW = {
-    "docs/agreement/command_line.md",
-    "docs/ci.md",
-    "docs/conduct.md",
-    "docs/gallery.md",
-    "docs/hardware.md",
-    "docs/identification.md",
-    "docs/latent_trait.md",
-    "docs/planning.md",
-    "docs/report.md",
-    "docs/training.md",
+    "docs/reference/agree.md",
+    "docs/howto/ci.md",
+    "docs/howto/laboratory/conduct.md",
+    "docs/howto/gallery.md",
+    "docs/howto/laboratory/hardware.md",
+    "docs/howto/laboratory/identification.md",
+    "docs/howto/latent_trait.md",
+    "docs/howto/planning.md",
+    "docs/howto/laboratory/report.md",
+    "docs/howto/laboratory/training.md",
 }
 
 # Whose files are looked at, too, by tests/lab/flow/test_coordinated_study.py.
-RUN_ELSEWHERE = {"docs/coordinating.md"}
+RUN_ELSEWHERE = {"docs/howto/laboratory/coordinating.md"}
 
 # Every block that is not run, and why. A new one has to be entered here.
 NOT_RUN = [
     ("README.md", "installs masrel; .ci/run runs it"),
     ("README.md", "installs masrel; .ci/run runs it"),
     ("CONTRIBUTING.md", "installs masrel and runs the tests"),
-    ("docs/accuracy.md", "takes minutes"),
-    ("docs/accuracy.md", "takes minutes"),
-    ("docs/audit.md", "it is shown above, and takes some seconds"),
-    ("docs/ci.md", "tests/docs/test_ci.py runs it"),
-    ("docs/ci.md", "tests/docs/test_ci.py runs it"),
-    ("docs/ci.md", "tests/docs/test_ci.py runs it"),
-    ("docs/coverage.md", "takes half an hour"),
-    ("docs/gallery.md", "takes some seconds"),
-    ("docs/hardware.md", "needs a CAN bus"),
-    ("docs/hardware.md", "needs a CAN bus"),
-    ("docs/hardware.md", "needs a CAN bus"),
-    ("docs/hardware.md", "needs a CAN bus"),
-    ("docs/hardware.md", "needs a CAN bus"),
-    ("docs/judges.md", "installs masrel"),
-    ("docs/judges.md", "is for GitHub"),
-    ("docs/report.md", "needs Chromium"),
-    ("docs/report.md", "needs other interpreters"),
-    ("docs/serving.md", "serves until it is stopped"),
-    ("docs/serving.md", "serves until it is stopped"),
-    ("docs/training.md", "takes ten minutes"),
+    ("docs/evidence/accuracy.md", "takes minutes"),
+    ("docs/evidence/accuracy.md", "takes minutes"),
+    ("docs/howto/audit.md", "it is shown above, and takes some seconds"),
+    ("docs/howto/ci.md", "tests/docs/test_ci.py runs it"),
+    ("docs/howto/ci.md", "tests/docs/test_ci.py runs it"),
+    ("docs/howto/ci.md", "tests/docs/test_ci.py runs it"),
+    ("docs/evidence/coverage.md", "takes half an hour"),
+    ("docs/howto/gallery.md", "takes some seconds"),
+    ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
+    ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
+    ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
+    ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
+    ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
+    ("docs/howto/judges.md", "installs masrel"),
+    ("docs/howto/judges.md", "is for GitHub"),
+    ("docs/howto/laboratory/report.md", "needs Chromium"),
+    ("docs/howto/laboratory/report.md", "needs other interpreters"),
+    ("docs/howto/laboratory/serving.md", "serves until it is stopped"),
+    ("docs/howto/laboratory/serving.md", "serves until it is stopped"),
+    ("docs/howto/laboratory/training.md", "takes ten minutes"),
 ]
 
 # What a piece of a protocol may be, and what it leaves out.

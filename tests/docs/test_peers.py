@@ -1,4 +1,4 @@
-"""What docs/peers.md says of masrel is what it computes; others are not run here."""
+"""What docs/evidence/peers.md says of masrel is computed; others are not run here."""
 
 import re
 from pathlib import Path

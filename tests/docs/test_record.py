@@ -1,4 +1,4 @@
-"""Every promise of docs/record.md is held by the test that its line names."""
+"""Every promise of docs/explanation/record.md is held by the test in its line."""
 
 import ast
 import re
@@ -10,7 +10,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]
-    for line in (ROOT / "docs/record.md").read_text(encoding="utf-8").splitlines()
+    for line in (ROOT / "docs/explanation/record.md")
+    .read_text(encoding="utf-8")
+    .splitlines()
     if re.match(r"\| (curious|careless|dishonest|hostile)", line)
 ]
 

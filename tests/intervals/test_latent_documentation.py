@@ -9,7 +9,7 @@ from masrel.intervals import LatentTrait, latent_trait
 from tests.intervals.data import SCALE, TABLE_V
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "latent_trait.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "howto" / "latent_trait.md").read_text(encoding="utf-8")
 RATERS = {"Table V, 4 × 8": range(8), "its raters 1, 4, 6: 4 × 3": (0, 3, 5)}
 ROWS = re.findall(
     r"^\| (.*\d) \| (fixed|random) \| (.*) to (.*) \| (.*) to (.*) \|$",

@@ -1,8 +1,8 @@
 """masrel and other packages beside exact fractions: how far is each number off?
 
 ``python -m docs.make.accuracy [--quiet]`` runs the cases of ``cases.py``, which
-takes some minutes, and writes ``docs/accuracy.md`` and its figure. Packages that are
-not installed are left out.
+takes some minutes, and writes ``docs/evidence/accuracy.md`` and its figure. Packages
+that are not installed are left out.
 """
 
 import argparse
@@ -157,7 +157,7 @@ def main() -> None:
     versions |= installed(["numpy", "scipy", "pandas", "mpmath"])
     versions["Python"] = platform.python_version()
     draw(lines, DOCS / "figures" / "accuracy.png")
-    path = DOCS / "accuracy.md"  # its last section is written by elbow.py
+    path = DOCS / "evidence/accuracy.md"  # its last section is written by elbow.py
     path.write_text(
         page(lines, versions) + elbow.written_section(path), encoding="utf-8"
     )

@@ -2,7 +2,7 @@
 
 ``python -m docs.make.accuracy.elbow [--quiet]`` solves thousands of random scenes and
 the built corner cases twice, which takes some minutes, and writes the last section of
-``docs/accuracy.md``; the rest of the page stays as it is.
+``docs/evidence/accuracy.md``; the rest of the page stays as it is.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from docs.make.accuracy import cells
 from tests.lab.elbow.exactness import Errors, errors
 from tests.lab.elbow.scenes import KINDS, N_SEEDS, corner_cases, random_scene
 
-PAGE = Path(__file__).parents[2] / "accuracy.md"
+PAGE = Path(__file__).parents[2] / "evidence" / "accuracy.md"
 HEADING = "\n## The joint model\n"
 
 _TEMPLATE = Path(__file__).with_name("elbow_template.md")

@@ -1,7 +1,8 @@
 """Agreement coefficients beside other packages: time, memory, error.
 
-``python -m docs.make.benchmarks.agreement [--quick]`` writes ``docs/benchmarks.md``
-and its figures. Times gate nothing; ratios are of one run, turn by turn.
+``python -m docs.make.benchmarks.agreement [--quick]`` writes
+``docs/evidence/benchmarks.md`` and its figures. Times gate nothing; ratios are of one
+run, turn by turn.
 """
 
 import argparse
@@ -222,7 +223,7 @@ def main() -> None:
     versions = present([*PEERS, "scikit-learn", "numpy", "pandas"])
     machine = f"{platform.machine()}, Python {platform.python_version()}"
     write_page(
-        DOCS / "benchmarks.md",
+        DOCS / "evidence/benchmarks.md",
         lines,
         more,
         megabytes,

@@ -1,8 +1,8 @@
 """``masrel report`` from nothing, beside what it was, and a page of a file of ratings.
 
 ``python -m docs.make.benchmarks.cold [--before CHECKOUT]`` writes its part of
-``docs/benchmarks.md``; the checkout is one of an earlier commit. Times are processor
-seconds of processes, turn by turn.
+``docs/evidence/benchmarks.md``; the checkout is one of an earlier commit. Times are
+processor seconds of processes, turn by turn.
 """
 
 import argparse
@@ -138,7 +138,7 @@ def main() -> None:
         "|---|---|---|",
         *pages,
     ]
-    write_part(ROOT / "docs" / "benchmarks.md", "cold", lines)
+    write_part(ROOT / "docs/evidence/benchmarks.md", "cold", lines)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """The joint model: one scene, thousands of scenes, and run time against error.
 
-``python -m docs.make.benchmarks.elbow [--quiet]`` prints the tables of docs/elbow.md
-and draws its figures. Times are of the processor, so that other load counts for less;
-all functions of a table are timed in turn in one run.
+``python -m docs.make.benchmarks.elbow [--quiet]`` prints the tables of
+docs/reference/elbow.md and draws its figures. Times are of the processor, so that other
+load counts for less; all functions of a table are timed in turn in one run.
 """
 
 import argparse

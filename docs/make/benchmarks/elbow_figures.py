@@ -1,4 +1,4 @@
-"""The figures of docs/elbow.md about run time and sampling."""
+"""The figures of docs/reference/elbow.md about run time and sampling."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,7 @@
 """Intervals beside scipy's: ratios of time, and memory.
 
 ``python -m docs.make.benchmarks.intervals [--quick]`` writes its part of
-``docs/benchmarks.md``. Times gate nothing.
+``docs/evidence/benchmarks.md``. Times gate nothing.
 """
 
 import argparse
@@ -35,7 +35,7 @@ def main() -> None:
     packages = ["numpy", "scipy"]
     machine = f"{platform.machine()}, Python {platform.python_version()}"
     versions = {"masrel": masrel.__version__, **present(packages)}
-    write_page(DOCS / "benchmarks.md", results, versions, machine)
+    write_page(DOCS / "evidence/benchmarks.md", results, versions, machine)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """``masrel agree`` of a large file of text, beside pandas and DuckDB.
 
 ``python -m docs.make.benchmarks.large_text [--quick]`` writes its part of
-``docs/benchmarks.md``.
+``docs/evidence/benchmarks.md``.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from pathlib import Path
 from docs.make.benchmarks.parts import write_part
 from tests.benchmarks.large_text import ORDERS, Run, measured, ratio
 
-PAGE = Path(__file__).parents[2] / "benchmarks.md"
+PAGE = Path(__file__).parents[2] / "evidence" / "benchmarks.md"
 TURNS = 5
 
 

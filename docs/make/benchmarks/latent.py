@@ -1,7 +1,8 @@
 """What the latent-trait model costs.
 
-``python -m docs.make.benchmarks.latent`` writes its part of ``docs/latent_trait.md``.
-Ratings are drawn from the model itself; each study is sampled once, under one prior.
+``python -m docs.make.benchmarks.latent`` writes its part of
+``docs/howto/latent_trait.md``. Ratings are drawn from the model itself; each study is
+sampled once, under one prior.
 """
 
 import time
@@ -88,7 +89,7 @@ def main() -> None:
         "|---|---|---|---|---|---|",
         *map(measure, STUDIES),
     ]
-    write_part(DOCS / "latent_trait.md", "costs", lines)
+    write_part(DOCS / "howto/latent_trait.md", "costs", lines)
 
 
 if __name__ == "__main__":

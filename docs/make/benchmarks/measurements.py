@@ -1,7 +1,7 @@
 """Coefficients of measurements, no two of them alike, beside the formulas in numpy.
 
 ``python -m docs.make.benchmarks.measurements [--quick]`` writes its part of
-``docs/benchmarks.md``. Times are processor seconds, turn by turn in one run.
+``docs/evidence/benchmarks.md``. Times are processor seconds, turn by turn in one run.
 """
 
 import argparse
@@ -226,7 +226,7 @@ def main() -> None:
     if quick:
         print("\n".join(lines))
         return
-    write_part(DOCS / "benchmarks.md", "measurements", lines)
+    write_part(DOCS / "evidence/benchmarks.md", "measurements", lines)
 
 
 if __name__ == "__main__":

@@ -136,7 +136,7 @@ def write_page(
         f"it is {_with_errors(lines)}. From 10 000 "
         f"items on, log time against log ratings rises by at most {steepest:.2f}.",
         "",
-        "![Time against ratings](figures/benchmark_time.png)",
+        "![Time against ratings](../figures/benchmark_time.png)",
         "",
         "Most memory at once beyond the input, 10 million items by 3 raters: "
         + ", ".join(f"{name} {mb:,.0f} MB" for name, mb in megabytes.items())
@@ -164,7 +164,7 @@ def write_page(
         "fractions. The dashed line is half a unit in the last place below 1. irrCAC "
         "rounds to five decimals.",
         "",
-        "![Error against time](figures/benchmark_error.png)",
+        "![Error against time](../figures/benchmark_error.png)",
     ]
     write_part(path, "estimates", text)
 

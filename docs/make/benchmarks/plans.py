@@ -1,8 +1,9 @@
 """A million simulated studies beside a loop over ``fleiss_kappa``.
 
-``python -m docs.make.benchmarks.plans`` writes its part of ``docs/benchmarks.md``:
-Fleiss' kappa with its standard error in 1e6 studies of 30 items by 5 raters, in one
-process, and by calling `fleiss_kappa` study by study on 2 000 of them, in one run.
+``python -m docs.make.benchmarks.plans`` writes its part of
+``docs/evidence/benchmarks.md``: Fleiss' kappa with its standard error in 1e6 studies of
+30 items by 5 raters, in one process, and by calling `fleiss_kappa` study by study on 2
+000 of them, in one run.
 """
 
 import platform
@@ -18,7 +19,7 @@ from masrel.planning import Study
 from masrel.planning import _studies as masrel_studies
 from masrel.planning._truth import Design, design_of
 
-PAGE = Path(__file__).parents[2] / "benchmarks.md"
+PAGE = Path(__file__).parents[2] / "evidence" / "benchmarks.md"
 N_STUDIES, N_LOOPED = 1_000_000, 2_000
 
 

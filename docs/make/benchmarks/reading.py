@@ -1,8 +1,8 @@
 """``masrel agree FILE`` beside what an analyst would write with pandas and a peer.
 
 ``python -m docs.make.benchmarks.reading [--quick]`` writes its part of
-``docs/benchmarks.md``. Every run is a process of its own: imports, reading, estimates.
-Memory of this process counts for its children: what writes is loaded late.
+``docs/evidence/benchmarks.md``. Every run is a process of its own: imports, reading,
+estimates. Memory of this process counts for its children: what writes is loaded late.
 """
 
 import argparse
@@ -193,7 +193,7 @@ def main() -> None:
     if options.quick:
         print("\n".join(lines))
         return
-    write_part(DOCS / "benchmarks.md", "reading", lines)
+    write_part(DOCS / "evidence/benchmarks.md", "reading", lines)
 
 
 if __name__ == "__main__":

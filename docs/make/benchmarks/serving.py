@@ -1,7 +1,8 @@
 """Sessions by the browser: what a server costs the control loop, and how soon it acts.
 
 ``python -m docs.make.benchmarks.serving [--quick]`` writes its part of
-``docs/benchmarks.md``, in about 18 minutes. It needs a machine that does nothing else.
+``docs/evidence/benchmarks.md``, in about 18 minutes. It needs a machine that does
+nothing else.
 """
 
 import argparse
@@ -157,7 +158,7 @@ def main() -> None:
         "",
         *of_taps,
     ]
-    write_part(DOCS / "benchmarks.md", "serving", lines)
+    write_part(DOCS / "evidence/benchmarks.md", "serving", lines)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """``masrel agree FILE`` of files larger than memory, beside DuckDB's own group-by.
 
 ``python -m docs.make.benchmarks.streams [--quick] [--folder FOLDER]`` writes its part
-of ``docs/benchmarks.md`` and a figure. Files of up to 10⁸ ratings are generated, 1 GB.
-Memory of this process counts for its children: what writes and draws is loaded late.
+of ``docs/evidence/benchmarks.md`` and a figure. Files of up to 10⁸ ratings are
+generated, 1 GB. Memory of this process counts for its children: what writes and draws
+is loaded late.
 """
 
 import argparse
@@ -248,7 +249,7 @@ def page(points: list[Point]) -> list[str]:
         "Log time against log ratings rises, between the two largest files, by "
         f"{slopes}.",
         "",
-        "![Time against ratings of streams](figures/benchmark_streams.png)",
+        "![Time against ratings of streams](../figures/benchmark_streams.png)",
         "",
         "Dashed and open: not run, but extrapolated in a straight line through the two "
         "largest files, because what Python takes to start makes a slope look flat.",
@@ -277,7 +278,7 @@ def main() -> None:
         print("\n".join(page(points)))
         return
     draw(points, DOCS / "figures" / "benchmark_streams.png")
-    write_part(DOCS / "benchmarks.md", "streams", page(points))
+    write_part(DOCS / "evidence/benchmarks.md", "streams", page(points))
 
 
 if __name__ == "__main__":

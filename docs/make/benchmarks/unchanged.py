@@ -1,7 +1,7 @@
 """``masrel report`` where nothing has changed, beside ``doit`` and as many files.
 
 ``python -m docs.make.benchmarks.unchanged [--quick]`` writes its part of
-``docs/benchmarks.md``. Times are processor seconds of processes, turn by turn.
+``docs/evidence/benchmarks.md``. Times are processor seconds of processes, turn by turn.
 """
 
 import argparse
@@ -108,7 +108,7 @@ def main() -> None:
         "|---|---|---|---|---|",
         *rows,
     ]
-    write_part(DOCS / "benchmarks.md", "unchanged", lines)
+    write_part(DOCS / "evidence/benchmarks.md", "unchanged", lines)
 
 
 if __name__ == "__main__":

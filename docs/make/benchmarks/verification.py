@@ -1,7 +1,7 @@
 """``masrel verify`` of a large study, beside ``sha256sum`` of the same files.
 
 ``python -m docs.make.benchmarks.verification [--quick]`` writes its part of
-``docs/benchmarks.md``. Times are processor seconds of processes, turn by turn.
+``docs/evidence/benchmarks.md``. Times are processor seconds of processes, turn by turn.
 """
 
 import argparse
@@ -79,7 +79,7 @@ def main() -> None:
         "|---|---|---|---|---|",
         *rows,
     ]
-    write_part(DOCS / "benchmarks.md", "verification", lines)
+    write_part(DOCS / "evidence/benchmarks.md", "verification", lines)
 
 
 if __name__ == "__main__":

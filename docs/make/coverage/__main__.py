@@ -1,7 +1,8 @@
 """How often 95 % intervals hold what they ask for, by question, size and coefficient.
 
-``python -m docs.make.coverage`` writes ``docs/coverage.csv``, ``docs/coverage.md`` and
-its figures; with ``--page`` only the page and the figures, from the rows there are.
+``python -m docs.make.coverage`` writes ``docs/evidence/coverage.csv``,
+``docs/evidence/coverage.md`` and its figures; with ``--page`` only the page and the
+figures, from the rows there are.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from masrel.agreement import CodedRatings
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals import analytic, bootstrap, estimate, jackknife
 
-DOCS = Path(__file__).parents[2]
+EVIDENCE = Path(__file__).parents[2] / "evidence"
 SEED, N_STUDIES = 20_261, 1_000
 
 SHARES = (0.35, 0.3, 0.2, 0.15)
@@ -137,7 +138,9 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--page", action="store_true", help="from the rows there are")
     parser.add_argument("--quiet", action="store_true", help="say nothing")
-    parser.add_argument("--into", type=Path, default=DOCS, help="folder of the page")
+    parser.add_argument(
+        "--into", type=Path, default=EVIDENCE, help="folder of the page"
+    )
     options = parser.parse_args()
     if not options.page:
         rows = run(options.studies, processes=options.processes, quiet=options.quiet)

@@ -1,6 +1,7 @@
 """The study by which the default interval for other items is chosen, and checked.
 
-``python -m docs.make.coverage.defaults`` writes ``docs/coverage_defaults.csv``.
+``python -m docs.make.coverage.defaults`` writes
+``docs/evidence/coverage_defaults.csv``.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from masrel.agreement import CodedRatings
 from masrel.estimates import Interval, IntervalMethod
 from masrel.intervals import estimate, jackknife, posterior
 
-DOCS = Path(__file__).parents[2]
+EVIDENCE = Path(__file__).parents[2] / "evidence"
 SEED = 20_264
 
 FAMILIES = ("Dirichlet-multinomial", "latent trait", "latent class")
@@ -177,7 +178,7 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--held-out", action="store_true", help="the other 20 cells")
     parser.add_argument("--quiet", action="store_true", help="say nothing")
-    parser.add_argument("--into", type=Path, default=DOCS)
+    parser.add_argument("--into", type=Path, default=EVIDENCE)
     options = parser.parse_args()
     cells = held_out() if options.held_out else deciding()
     study = Study(name="defaults", cells=cells, methods=METHODS, seed=SEED)

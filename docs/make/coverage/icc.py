@@ -1,6 +1,7 @@
 """How often the intervals of ICC(A,1) of complete tables hold it, by F and by profile.
 
-``python -m docs.make.coverage.icc`` prints the table of ``docs/agreement/icc.md``.
+``python -m docs.make.coverage.icc`` prints the table of
+``docs/reference/coefficients/icc.md``.
 """
 
 import argparse

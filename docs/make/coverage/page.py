@@ -49,7 +49,7 @@ def write_page(folder: Path) -> None:
     (folder / "coverage.md").write_text(page(folder), encoding="utf-8")
     first = _of_first(read(folder / "coverage.csv"))
     panels = first["study"].map(QUESTIONS) + ": " + first["family"]
-    figures = folder / "figures"
+    figures = folder.parent / "figures"
     draw(first.assign(panel=panels), figures / "coverage.png", LOOKS)
     if (decided := folder / "coverage_defaults.csv").exists():
         rows = read(decided)
@@ -150,7 +150,7 @@ def _rules(folder: Path) -> str:
     """Return what became of the default for other items, where that is known."""
     parts = []
     if (folder / "coverage_defaults.csv").exists():
-        parts = ["![Coverage of the rules](figures/coverage_defaults.png)", _CAPTION]
+        parts = ["![Coverage of the rules](../figures/coverage_defaults.png)", _CAPTION]
     for name, title in (
         ("coverage_defaults.csv", "Of the cells by which the rule was chosen:"),
         ("coverage_held_out.csv", "Of cells drawn once it was:"),

@@ -153,7 +153,7 @@ def device() -> None:
 
     In this order: probe asks who is there, check looks whether a puck can be driven,
     zero tells it where the arm is, friction turns the free arm. What to make of it
-    is in docs/hardware.md. To try them: --emulate.
+    is in docs/howto/laboratory/hardware.md. To try them: --emulate.
     """
 
 

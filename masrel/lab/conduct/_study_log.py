@@ -116,8 +116,8 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
     Returns
     -------
     tuple of Event
-        In order of time, with the fields that ``docs/conduct.md`` lists; None stands
-        for all, or for nothing. Empty when nothing happened.
+        In order of time, with the fields that ``docs/howto/laboratory/conduct.md``
+        lists; None stands for all, or for nothing. Empty when nothing happened.
 
     Raises
     ------

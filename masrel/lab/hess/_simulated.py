@@ -309,7 +309,8 @@ class TorqueSensor:
     """The torque sensor of the simulated device, between motor and arm.
 
     It reads what the arm pulls at: the motor's torque, friction and what moves the
-    motor itself. The numbers are of no product; ``docs/driver.md`` gives reasons.
+    motor itself. The numbers are of no product; ``docs/explanation/driver.md`` gives
+    reasons.
 
     Attributes
     ----------

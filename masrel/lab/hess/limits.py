@@ -56,7 +56,9 @@ def _check_not_negative(**values: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceLimits:
-    """What the loop lets pass, in SI units; ``docs/driver.md`` gives the reasons.
+    """What the loop lets pass, in SI units.
+
+    ``docs/explanation/driver.md`` gives the reasons.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """The types a protocol file decodes into; each key of the file is a field here.
 
 Every field has its unit in its name, its range in its type, and its meaning in
-``docs/protocol.md``.
+``docs/reference/protocol.md``.
 """
 
 import re

@@ -39,7 +39,7 @@ def read_protocol(path: Path) -> Protocol:
     Parameters
     ----------
     path : Path
-        A TOML file; ``docs/protocol.md`` has its keys.
+        A TOML file; ``docs/reference/protocol.md`` has its keys.
 
     Returns
     -------

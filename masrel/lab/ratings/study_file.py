@@ -67,7 +67,8 @@ def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
     ----------
     path : Path or str
         A CSV file with columns `rater`, `model` (or `item`) and `grade`;
-        ``docs/ratings.md`` has the others. Any other file is for `read_ratings`.
+        ``docs/reference/formats/ratings.md`` has the others. Any other file is for
+        `read_ratings`.
     scale : Scale
         The grades a rater may give.
 

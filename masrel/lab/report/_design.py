@@ -195,7 +195,7 @@ def _other_kinds(material: Material) -> Iterator[Table]:
                 (model.id, model.kind, text)
                 for model, text in zip(others, numbers, strict=True)
             ),
-            notes=("Keys end in their units; what each is stands in docs/tone.md.",),
+            notes=("Keys end in their units; docs/reference/tone explains each.",),
             data=material.data,
         )
 

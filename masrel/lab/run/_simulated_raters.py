@@ -1,6 +1,7 @@
 """Simulated raters: grades and speeds of a stated accuracy, for trying a study out.
 
-Nothing here models a person. ``docs/session_log.md`` states the rules in words.
+Nothing here models a person. ``docs/reference/formats/session_log.md`` states the rules
+in words.
 """
 
 import hashlib

@@ -167,8 +167,8 @@ class Calibration:
         The evidence that passes a training.
     false_passes : mapping of str to float
         By kind of trainee, the share that passes although kappa stays at the
-        insufficient one; ``docs/training.md`` describes each kind. A kind is lacking
-        where none of it is so bad.
+        insufficient one; ``docs/howto/laboratory/training.md`` describes each kind. A
+        kind is lacking where none of it is so bad.
     false_fails : mapping of str to float
         The same of those that do not pass although kappa is at the sufficient one from
         the first presentation on.

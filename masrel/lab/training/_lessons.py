@@ -1,7 +1,7 @@
 """What the log of a training says: criterion, lessons, learning curve, and the end.
 
-The log is a chain like that of a session (``docs/session_log.md``), with events of its
-own: ``docs/training.md`` lists them.
+The log is a chain like that of a session (``docs/reference/formats/session_log.md``),
+with events of its own: ``docs/howto/laboratory/training.md`` lists them.
 """
 
 import warnings

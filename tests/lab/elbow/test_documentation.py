@@ -1,4 +1,4 @@
-"""The figures of docs/elbow.md are drawn by the commands below them."""
+"""The figures of docs/reference/elbow.md are drawn by the commands below them."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from docs.make.pages import output
 
 DOCS = Path(__file__).parents[3] / "docs"
-PAGE = (DOCS / "elbow.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "reference" / "elbow.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"`(masrel joint trace [^`]*--figure (\S+)\.png)`", PAGE)
 
 

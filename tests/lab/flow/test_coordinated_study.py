@@ -1,4 +1,4 @@
-"""The study of docs/coordinating.md, held against a script that reads its logs."""
+"""The study at two sites of the handbook, held against a script that reads its logs."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ from docs.make.pages import read
 from tests.docs.test_pages import TEXTS, hold_page
 from tests.files import table_of
 
-PAGE = "docs/coordinating.md"
+PAGE = "docs/howto/laboratory/coordinating.md"
 SCRIPT = Path(__file__).with_name("independent.py")
 
 pytestmark = pytest.mark.slow

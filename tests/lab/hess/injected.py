@@ -1,6 +1,6 @@
 """At least 25 faults, each put into a session, and what came of it.
 
-``python -m tests.lab.hess.injected`` prints the table of docs/driver.md.
+``python -m tests.lab.hess.injected`` prints the table of docs/explanation/driver.md.
 """
 
 import contextlib
@@ -437,7 +437,7 @@ def cell(value: float, digits: int) -> str:
 
 
 def row(made: Outcome) -> str:
-    """One row of the table in docs/driver.md."""
+    """One row of the table in docs/explanation/driver.md."""
     zero = cell(made.zero_ms, 0)
     if math.isnan(made.zero_ms) and made.kind not in (None, "released", "process"):
         zero = "never"

@@ -1,4 +1,4 @@
-"""What docs/driver.md says is what the driver does."""
+"""What docs/explanation/driver.md says is what the driver does."""
 
 import csv
 import re
@@ -15,7 +15,7 @@ from .rig import END, START
 
 STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
 DOCS = Path(__file__).parents[3] / "docs"
-PAGE = (DOCS / "driver.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "explanation/driver.md").read_text(encoding="utf-8")
 
 
 def table_5() -> list[tuple[str, float]]:
@@ -35,7 +35,7 @@ def test_the_devices_are_those_that_the_page_names() -> None:
     # When a backend is added, the page's first statement has to change.
     assert device_names() == ("puck", "replay", "simulated")
     assert "It has not been tested on physical hardware" in PAGE
-    first = (DOCS / "hardware.md").read_text(encoding="utf-8").split("\n\n")[1]
+    first = (DOCS / "howto/laboratory/hardware.md").read_text("utf-8").split("\n\n")[1]
     assert first.startswith("**Nothing on this page has been tested on physical hard")
 
 

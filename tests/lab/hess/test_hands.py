@@ -22,7 +22,7 @@ from masrel.lab.hess import (
 
 from .rig import CATCH, END, MODELS, PRE_CATCH, START, law_of, present
 
-PAGE = Path(__file__).parents[3] / "docs" / "driver.md"
+PAGE = Path(__file__).parents[3] / "docs" / "explanation" / "driver.md"
 STRETCH = {"start": 0.5, "end": 2.5, "mean_speed": 1.5}
 CALM = HandTraits(stiffness=30.0, damping=1.5, inertia=0.06, tremor=0.0)
 

@@ -27,7 +27,7 @@ from . import faults as f
 from .injected import N_STRETCHES, Injection, Outcome, Wrong, injections, outcome, row
 from .rig import LIMITS, MODELS, ActingClock, controls, missing, present, stretching
 
-PAGE = Path(__file__).parents[3] / "docs" / "driver.md"
+PAGE = Path(__file__).parents[3] / "docs" / "explanation" / "driver.md"
 INJECTIONS = injections()
 BY_NAME = {injection.name: injection for injection in INJECTIONS}
 
@@ -78,7 +78,9 @@ def assert_as_expected(made: Outcome, injection: Injection) -> None:
     assert made.events[1:5] == ["presented", "fault", "presented", "grade"]
     assert made.peak_nm <= made.held_nm  # never more than was there
     if injection.name == "bus cut for good":
-        assert math.isnan(made.zero_ms)  # no software can; docs/driver.md says so
+        assert math.isnan(
+            made.zero_ms
+        )  # no software can; docs/explanation/driver.md says so
     else:
         assert made.zero_ms <= 100.0
 

@@ -207,7 +207,7 @@ def row(kind: str, outcomes: list[Outcome]) -> str:
 
 # What came of them
 
-PAGE = Path(__file__).parents[3] / "docs" / "tone.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "tone" / "index.md"
 GUARDED = [kind for kind, model in KINDS.items() if not model.is_passive]
 
 

@@ -1,4 +1,4 @@
-"""docs/protocol.md has every table and key, with the default the code has."""
+"""docs/reference/protocol.md has every table and key, with the default the code has."""
 
 import json
 import re
@@ -11,7 +11,7 @@ from masrel.lab import protocol as definition
 from masrel.lab.protocol import Protocol, read_protocol, report_sections
 from masrel.lab.protocol.definition import Blinding
 
-PAGE = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs/reference/protocol.md").read_text("utf-8")
 
 TABLES = {
     "[study]": definition.Study,

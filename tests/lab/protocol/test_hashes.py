@@ -131,7 +131,8 @@ def test_what_enters_the_whole_and_what_is_presented(
 
 
 def test_a_hash_is_that_of_canonical_json(tmp_path: Path) -> None:
-    # Written by hand from docs/protocol.md: keys sorted, no spaces, defaults in.
+    # Written by hand from docs/reference/protocol.md: keys sorted, no spaces, defaults
+    # in.
     elbow = (
         '{"catch_slope_s":0.35,"damping_nms_rad":1.26,"inertia_kg_m2":0.0,'
         '"peak_duration_s":0.1,"post_catch":"continuous",'

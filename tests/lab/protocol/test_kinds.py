@@ -17,7 +17,7 @@ from tests.lab.protocol.documents import VALID, changed, problems_of, write
 from tests.lab.protocol.test_hashes import hashes
 
 KINDS = [kind for kind in MODELS if kind != ElbowParameters.kind]
-PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "protocol.md"
 
 
 def of_kind(kind: str, **parameters: object) -> dict[str, Any]:

@@ -251,7 +251,7 @@ def test_a_fact_that_is_no_json_is_refused_and_leaves_the_log_whole(
     assert len(read_log(tmp_path / "a.jsonl")) == 1
 
 
-PAGE = Path(__file__).parents[3] / "docs" / "session_log.md"
+PAGE = Path(__file__).parents[3] / "docs/reference/formats/session_log.md"
 
 
 def verified(folder: Path) -> subprocess.CompletedProcess[str]:

@@ -104,7 +104,8 @@ def test_codes_say_nothing_about_the_order_over_secrets() -> None:
     assert chi_square < 85.6
 
 
-# The test vector of docs/record.md, from HMAC-SHA256 and PCG64 in Python integers.
+# The test vector of docs/explanation/record.md, from HMAC-SHA256 and PCG64 in Python
+# integers.
 VECTOR_ORDER = "HM3 HM1 D04 D02 HM2 D03 D01 HM4"
 VECTOR_CODES = "75M 36H 28M 66B 85Y 36U 94K 46A"
 VECTOR_COMMITMENT = "8d4a74f771e01cd6b33c693f781aad74a7ee13ea8497dcd88dc68c30d35ceed6"

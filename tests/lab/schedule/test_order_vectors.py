@@ -1,4 +1,4 @@
-"""The test vectors of docs/orders.md, and some of them derived from its rules alone."""
+"""Test vectors of docs/reference/orders.md, some derived from its rules alone."""
 
 import hmac
 import itertools
@@ -13,7 +13,7 @@ import pytest
 from masrel.lab.schedule import draw_schedule
 from tests.lab.schedule.studies import SECRET, protocol_of, words_from
 
-PAGE = (Path(__file__).parents[3] / "docs" / "orders.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs/reference/orders.md").read_text("utf-8")
 MODELS = ("HM1", "HM2", "HM3", "HM4", "D01", "D02", "D03", "D04")
 
 RULES: dict[str, dict[str, Any]] = {

@@ -437,7 +437,7 @@ def read_movement(
         where the name does not say it.
     units : mapping of str to str, optional
         Quantity to unit, for columns without a unit in their name; see
-        `docs/identification.md`.
+        `docs/howto/laboratory/identification.md`.
     of_device : bool, optional
         Whether the device is of interest and not the joint: of a recording of masrel's
         driver the torque that was sent is then taken off the measured one.

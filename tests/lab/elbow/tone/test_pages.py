@@ -11,7 +11,7 @@ from docs.make.tone import FIGURES, SCENES
 from masrel.lab.elbow import MODELS
 from masrel.lab.elbow.tone import ToneModel
 
-PAGES = Path(__file__).parents[4] / "docs" / "tone"
+PAGES = Path(__file__).parents[4] / "docs/reference/tone"
 LAWS = [law for law in MODELS.values() if issubclass(law, ToneModel)]
 SHARED = {"range_end", "speed_threshold"}
 
@@ -64,4 +64,4 @@ def test_every_law_has_a_figure_in_its_page() -> None:
     pages = "".join(page.read_text(encoding="utf-8") for page in PAGES.glob("*.md"))
     for name in SCENES:
         assert (FIGURES / f"{name}.png").is_file()
-        assert f"](../figures/{name}.png)" in pages
+        assert f"](../../figures/{name}.png)" in pages

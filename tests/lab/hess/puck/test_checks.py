@@ -312,7 +312,8 @@ def test_runs_that_cannot_tell_are_refused(runs: list[SteadyRun]) -> None:
 
 
 # A mirrored puck is the same to everybody: counts and torques change their signs
-# together, so that only a person who looks at the arm can tell (docs/hardware.md).
+# together, so that only a person who looks at the arm can tell
+# (docs/howto/laboratory/hardware.md).
 @pytest.mark.parametrize(
     ("start_deg", "options"), [(120.0, {}), (60.0, {"direction": -1})]
 )

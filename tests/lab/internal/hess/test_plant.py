@@ -33,7 +33,7 @@ from masrel.lab.hess._simulated import (
 from tests.benchmarks.driver_integrators import by_solve_ivp, chosen, commands
 from tests.lab.hess.rig import MODELS, controls, stretching
 
-PAGE = (Path(__file__).parents[4] / "docs" / "driver.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[4] / "docs/explanation/driver.md").read_text("utf-8")
 STEP_NS = 500_000
 QUANTUM = 18.8 / 2700.0
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}
