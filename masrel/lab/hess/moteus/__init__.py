@@ -1,0 +1,1 @@
+"""The mjbots moteus, a motor controller on a CAN-FD bus: drive it, or emulate it."""
