@@ -24,6 +24,7 @@ from masrel.lab.hess import (
     SimulatedHand,
     open_device,
 )
+from masrel.lab.hess._free_arm import LIMITS, SPEEDS
 from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
 from masrel.lab.hess.puck import (
     Link,
@@ -37,7 +38,6 @@ from masrel.lab.hess.puck import (
     steady_runs,
     zero,
 )
-from masrel.lab.hess.puck._commissioning import LIMITS, SPEEDS
 
 _N_NODES = 31
 _RANGE_END = math.radians(146.0)  # where an emulated arm meets its end stop

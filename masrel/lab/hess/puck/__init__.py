@@ -4,22 +4,19 @@
 `PuckOptions`. Opening a bus loads python-can.
 """
 
-from masrel.lab.hess.puck._bus import Frame, Link
-from masrel.lab.hess.puck._commissioning import (
+from masrel.lab.hess._can import Frame, Link
+from masrel.lab.hess._emulated import InjectedFault
+from masrel.lab.hess._free_arm import (
     Check,
     FrictionEstimate,
-    NodeReport,
     SteadyRun,
-    check,
     fit_friction,
-    probe,
     steady_runs,
-    zero,
 )
+from masrel.lab.hess.puck._commissioning import NodeReport, check, probe, zero
 from masrel.lab.hess.puck._emulator import connected
 from masrel.lab.hess.puck._puck_options import (
     EmulatorOptions,
-    InjectedFault,
     PropertyTable,
     PuckOptions,
     property_table,

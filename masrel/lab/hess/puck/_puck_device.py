@@ -20,20 +20,16 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
+from masrel.lab.hess._can import Frame, Link, Node
 from masrel.lab.hess._clock import Clock, RealClock, SimulatedClock
 from masrel.lab.hess.device import Device, DeviceSetup, IdleCommand, Reading
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.puck._bus import (
-    BUS_OFF,
-    BUS_RESTARTED,
     MAX_TORQUE,
-    Frame,
-    Link,
     decode_position,
     decode_value,
     encode_get,
     encode_value,
-    open_link,
     reply_identifiers,
 )
 from masrel.lab.hess.puck._emulator import connected
@@ -61,60 +57,48 @@ _POSITION = -1  # stands for its position among the numbers of other properties
 # What every puck answers; requested for the order of the answers, not for the values
 _MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
 
-_MAX_WAITING = 1000  # frames; more than fit on the bus in 50 ms
-_MAX_OVERDUE = 30  # more than fit on the bus in 1 ms
-_MAX_ERROR_FRAMES = 10  # on a bus of one joint there should be none
-
 ROLE_MASK = 0x1F  # the other bits of ROLE say what encoder it has
 _MOTOR_KIND = 0
 _OFF_BUS_S = 1.2  # a waking puck leaves the bus; public drivers wait 1.0 and 1.2 s
 _COUNT_TOLERANCE = 2  # an arm that is held moves the encoder by no more
 _SETTING_TIME_S = 0.001  # a setting takes 0.11 ms on the bus
 
-_PATIENCE_S = 0.1  # to let go; also what a bus needs that restarts itself after bus off
 _REPLY_PATIENCE_S = 0.005
 _BLIND_AFTER_S = 0.05
-_PAUSE_S = 0.001  # between two attempts
 
 _POLL_TICKS = 5  # torques after which it is asked for its mode, or for its torque
 _MAX_UNANSWERED = 2  # polls in a row; one may get lost
 _MAX_LOST_TORQUES = 1  # in a row; the next comes after a tick
 
-# python-can's "virtual" is inside this process, and most makers' adapters belong to
-# whoever opened them: on others no other process can idle a puck.
-_SHARED_INTERFACES = frozenset({"socketcan", "udp_multicast"})
-
 _channels = itertools.count(1)
 
 
-class PuckNode:
+class PuckNode(Node):
     """One puck, as this end of the bus speaks to it."""
 
     def __init__(self, link: Link, clock: Clock, puck: int) -> None:
-        self._link = link
-        self.clock = clock
+        super().__init__(link, clock, f"puck {puck}")
         self._position_reply, self._property_reply = reply_identifiers(puck)
         self._in_doubt = False  # whether a position may still come for an old request
-        self._n_overdue = 0  # frames that came after the deadline
         self._markers = itertools.cycle(_MARKERS)
         self.puck = puck
         self.values: dict[int, int] = {}  # the last of each property, by its number
-        self.n_foreign = self.n_errors = 0  # frames
 
     def set(self, number: int, value: int) -> None:
         """Set a property; a puck does not acknowledge it."""
-        self._link.send(Frame(self.puck, encode_value(number, value)))
+        self.link.send(Frame(self.puck, encode_value(number, value)))
 
     def request(self, number: int) -> int:
         """Request a property without waiting, and return when, ns; see `values`."""
-        return self._link.send(Frame(self.puck, encode_get(number)))
+        return self.link.send(Frame(self.puck, encode_get(number)))
 
     def get(self, number: int, *, patience_s: float = 0.05) -> int:
         """Request a property, wait for the reply, and return its value."""
         self.receive_waiting()
         self.values.pop(number, None)
         request_ns = self.request(number)
-        if not self._receive_until(number, request_ns + round(patience_s * 1e9)):
+        deadline_ns = request_ns + round(patience_s * 1e9)
+        if not self._receive_until(lambda: number in self.values, deadline_ns):
             raise DeviceTimeoutError(
                 f"puck {self.puck}: no answer for property {number} within "
                 f"{patience_s * 1e3:g} ms"
@@ -138,7 +122,9 @@ class PuckNode:
             self.request(awaited)
         deadline_ns = request_ns + round(patience_s * 1e9)
         # After the awaited reply nothing earlier can come any more.
-        self._in_doubt = not self._receive_until(awaited, deadline_ns)
+        self._in_doubt = not self._receive_until(
+            lambda: awaited in self.values, deadline_ns
+        )
         counts = self.values.pop(_POSITION, None)
         if self._in_doubt or counts is None:
             raise DeviceTimeoutError(
@@ -146,65 +132,14 @@ class PuckNode:
             )
         return min(request_ns + _SAMPLING_NS, self.clock.now_ns()), counts
 
-    def _receive_until(self, awaited: int, deadline_ns: int) -> bool:
-        # Whether the reply came in time
-        self._n_overdue = 0
-        while awaited not in self.values:
-            frame = self._next_frame(deadline_ns)
-            if frame is None:
-                return False
-            self._sort(frame)
-        return True
-
-    def _next_frame(self, deadline_ns: int) -> Frame | None:
-        # What waits is taken after the deadline too, because this end may be late;
-        # but only so many frames, because others may never fall silent.
-        if self.clock.now_ns() > deadline_ns:
-            self._n_overdue += 1
-            if self._n_overdue > _MAX_OVERDUE:
-                return None
-        return self._link.receive(deadline_ns)
-
-    def receive_waiting(self) -> None:
-        """Receive all frames that wait: late replies, errors, frames of others."""
-        for _ in range(_MAX_WAITING):
-            frame = self._link.receive(0)
-            if frame is None:
-                return
-            self._sort(frame)
-        raise BusError(f"puck {self.puck}: the bus is flooded with frames", "flooded")
-
     def _sort(self, frame: Frame) -> None:
-        if frame.is_error:
-            self._count_error(frame.identifier)
-        elif frame.identifier == self._position_reply:
+        if frame.identifier == self._position_reply:
             self.values[_POSITION] = decode_position(frame.data)
         elif frame.identifier == self._property_reply:
             number, value = decode_value(frame.data)
             self.values[number] = value
         else:
             self.n_foreign += 1
-
-    def _count_error(self, error_class: int) -> None:
-        if error_class & BUS_RESTARTED:
-            return
-        if error_class & BUS_OFF:
-            raise BusError(
-                f"puck {self.puck}: bus off, the host's controller has given up",
-                "bus-off",
-            )
-        self.n_errors += 1
-        if self.n_errors > _MAX_ERROR_FRAMES:
-            raise BusError(
-                f"puck {self.puck}: needs at most {_MAX_ERROR_FRAMES} error frames, "
-                f"the bus has reported {self.n_errors}, the last of class "
-                f"{error_class:#05x}",
-                "error-frames",
-            )
-
-    def wait(self, duration_s: float) -> None:
-        """Let time pass without sending a frame."""
-        self.clock.sleep_until_ns(self.clock.now_ns() + round(duration_s * 1e9))
 
 
 def motor_table(
@@ -354,24 +289,16 @@ class AwakePuck:
 
 def release(node: PuckNode, *, torque_id: int, mode_id: int) -> None:
     """Zero the torque and idle a puck, again and again until it confirms."""
-    start_ns = node.clock.now_ns()
-    reason = "it does not go to idle"
-    while (since_s := (node.clock.now_ns() - start_ns) * 1e-9) < _PATIENCE_S:
-        try:
-            node.set(torque_id, 0)
-            if _is_asleep(node, blindly=since_s > _BLIND_AFTER_S):
-                return
-            node.set(mode_id, IDLE)
-            node.set(mode_id, IDLE)  # twice: a regular loss may not hit both
-            if node.get(mode_id, patience_s=_REPLY_PATIENCE_S) == IDLE:
-                return
-        except (BusError, DeviceTimeoutError, FrameError) as error:
-            reason = str(error)
-        node.wait(_PAUSE_S)
-    raise DeviceError(
-        f"puck {node.puck}: not idle after {_PATIENCE_S * 1e3:g} ms ({reason}); it may "
-        "hold its last torque: SWITCH ITS SUPPLY OFF"
-    )
+
+    def attempt(since_s: float) -> bool:
+        node.set(torque_id, 0)
+        if _is_asleep(node, blindly=since_s > _BLIND_AFTER_S):
+            return True
+        node.set(mode_id, IDLE)
+        node.set(mode_id, IDLE)  # twice: a regular loss may not hit both
+        return node.get(mode_id, patience_s=_REPLY_PATIENCE_S) == IDLE
+
+    node.insist(attempt, "it may hold its last torque: SWITCH ITS SUPPLY OFF")
 
 
 def _is_asleep(node: PuckNode, *, blindly: bool) -> bool:
@@ -391,10 +318,10 @@ def prepare(
 ) -> Callable[[], None]:
     """Join the bus, as the watchdog's process, and return what releases the puck."""
     clock = RealClock()
-    accepted = reply_identifiers(int(puck))
-    link = open_link(interface, channel, clock=clock, accepted=accepted)
+    options = PuckOptions(interface=interface, channel=channel, puck=int(puck))
+    link = options.open_link(clock, accepted=reply_identifiers(options.puck))
     atexit.register(link.close)
-    node = PuckNode(link, clock, int(puck))
+    node = PuckNode(link, clock, options.puck)
     return lambda: release(node, torque_id=int(torque_id), mode_id=int(mode_id))
 
 
@@ -536,7 +463,7 @@ class PuckDevice(Device):
     def idle_command(self) -> IdleCommand | None:
         """Return how another process can idle the puck, once it is open."""
         options = self._options
-        if options.interface not in _SHARED_INTERFACES:
+        if not options.is_shared:
             return None
         numbers = (options.puck, self._puck.torque_id, self._puck.mode_id)
         return IdleCommand(

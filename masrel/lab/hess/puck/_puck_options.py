@@ -9,11 +9,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, Self, get_args
+from typing import ClassVar, Literal, Self
 
 from masrel.errors import DeviceError, ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
-from masrel.lab.hess.device import BackendOptions
+from masrel.lab.hess._can import BusOptions, check_direction
+from masrel.lab.hess._emulated import InjectedFault
 from masrel.lab.hess.limits import _check_not_negative, _check_positive
 
 GEAR_RATIO = 18.8
@@ -280,86 +281,7 @@ class Transmission:
         return -self.direction * units * self.torque_step
 
 
-def check_direction(direction: int) -> None:
-    """Refuse a direction that is neither with nor against extension."""
-    if direction not in (1, -1):
-        raise ParameterError(f"direction: needs 1 or -1, got {direction}")
-
-
 _MAX_MOTOR_NODE = 7  # 8 to 31 are hands, sensors and the safety module
-
-_WITHOUT_HARDWARE = frozenset({"virtual", "udp_multicast"})
-
-FaultKind = Literal[
-    "dropped-requests",  # what the host sends gets lost, torques included
-    "dropped-replies",  # the puck's answers get lost
-    "dropped-torques",  # torques alone get lost
-    "late-replies",  # `size` s later than they should
-    "duplicated-replies",  # each a second time, 0.1 ms later
-    "short-replies",  # one byte less
-    "foreign-frames",  # the safety module, another puck, another host
-    "error-frames",  # the bus reports a protocol error at every request
-    "bus-off",  # the host's controller gives up, and restarts at the end
-    "frozen-encoder",  # the count stands still
-    "jumping-encoder",  # `size` counts are added
-    "wrapping-encoder",  # whole turns of the motor are lost
-    "idled",  # somebody else sets MODE to idle, once
-    "reset",  # the supply fails for a moment, once
-    "unplugged",  # nothing goes either way
-]
-
-_SIZES: dict[str, float] = {"late-replies": 0.0015, "jumping-encoder": 2000.0}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InjectedFault:
-    """One fault of an emulated puck or its bus.
-
-    Attributes
-    ----------
-    kind : str
-        What fails: "dropped-requests", "dropped-replies", "dropped-torques",
-        "late-replies", "duplicated-replies", "short-replies", "foreign-frames",
-        "error-frames", "bus-off", "frozen-encoder", "jumping-encoder",
-        "wrapping-encoder", "idled", "reset" or "unplugged".
-    start_s : float
-        When, s after the puck was first put into torque mode.
-    end_s : float
-        Until when, s.
-    every : int
-        How many frames there are to one that is affected.
-    size : float or None
-        How late, s, or how far, counts; None for 1.5 ms and for 2000 counts, 9.3 deg.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such kind, or a value is outside its range.
-    """
-
-    kind: FaultKind
-    start_s: float
-    end_s: float = math.inf
-    every: int = 1
-    size: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in get_args(FaultKind):
-            raise ParameterError(
-                f"kind: needs one of {', '.join(get_args(FaultKind))}, got {self.kind}"
-            )
-        if not 0.0 <= self.start_s < self.end_s:
-            raise ParameterError(
-                "start_s, end_s: need 0 <= start_s < end_s, "
-                f"got {self.start_s} and {self.end_s}"
-            )
-        if self.every < 1:
-            raise ParameterError(f"every: needs 1 or more, got {self.every}")
-
-    @property
-    def amount(self) -> float:
-        """How late, s, or how far, counts; 0 where nothing is."""
-        return _SIZES.get(self.kind, 0.0) if self.size is None else self.size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -415,7 +337,7 @@ class EmulatorOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PuckOptions(BackendOptions):
+class PuckOptions(BusOptions):
     """Where a puck is, and how its device is to behave.
 
     Attributes
@@ -451,8 +373,8 @@ class PuckOptions(BackendOptions):
         If a value is outside its range.
     """
 
-    interface: str = "socketcan"
-    channel: str = "can0"
+    name: ClassVar[str] = "puck"
+
     puck: int = 1
     gear_ratio: float = GEAR_RATIO
     direction: Literal[1, -1] = 1
@@ -484,17 +406,6 @@ class PuckOptions(BackendOptions):
                 "interface: needs 'virtual' for an emulated puck, "
                 f"got {self.interface!r}"
             )
-
-    @property
-    def moves_hardware(self) -> bool:
-        """Whether a motor may be on this bus.
-
-        There is none on python-can's "virtual" and "udp_multicast", nor on a network
-        device whose name begins with "vcan".
-        """
-        return self.interface not in _WITHOUT_HARDWARE and not self.channel.startswith(
-            "vcan"
-        )
 
     def emulated(self, start: float) -> Self:
         """Return the same for an emulated puck of this gear, direction and firmware.

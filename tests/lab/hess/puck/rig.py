@@ -17,22 +17,26 @@ from masrel.lab.hess import (
     open_device,
     run_presentation,
 )
+from masrel.lab.hess._emulated import FaultKind
 from masrel.lab.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptions
-from masrel.lab.hess.puck._bus import open_link
 from masrel.lab.hess.puck._emulator import PuckEmulator
 from masrel.lab.hess.puck._puck_device import PuckDevice, PuckNode, build, release
 from masrel.lab.hess.puck._puck_options import (
     MEMORY_WRITERS,
-    FaultKind,
     Transmission,
 )
 from tests.lab.hess.rig import END, LIMITS, controls, stretching
 
-__all__ = ["open_link", "release"]
+__all__ = ["release"]
 
 PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
 
 _channels = count()
+
+
+def open_link(interface: str, channel: str, *, clock, accepted=None, peer=None) -> Link:
+    options = PuckOptions(interface=interface, channel=channel)
+    return options.open_link(clock, accepted=accepted, peer=peer)
 
 
 def loose(start_deg: float = 90.0) -> SimulatedHand:

@@ -10,7 +10,7 @@ from masrel.errors import (
     DeviceTimeoutError,
 )
 from masrel.lab.hess import SimulatedClock
-from masrel.lab.hess.puck import Frame, Link
+from masrel.lab.hess.puck import Frame, Link, PuckOptions
 from tests.lab.hess.puck.rig import (
     Bench,
     PuckNode,
@@ -171,7 +171,9 @@ class Babbling(Link):
 @pytest.mark.parametrize("wait", [PuckNode.get, PuckNode.position])
 def test_it_does_not_wait_for_ever_while_others_speak(wait) -> None:
     clock = SimulatedClock()
-    link = Babbling(open_link("virtual", "babbling", clock=clock)._bus, clock)
+    link = Babbling(
+        open_link("virtual", "babbling", clock=clock)._bus, clock, PuckOptions()
+    )
     node = PuckNode(link, clock, 1)
     for _ in range(2):  # the second position has a marker, too
         begun_ns = clock.now_ns()
@@ -192,7 +194,9 @@ class Deaf(Link):
 def test_a_puck_that_cannot_be_heard_is_idled_all_the_same(on) -> None:
     one = told(on(awake=True), (MODE, 2), (T, 100))
     assert one.node.get(T) == 100
-    node = PuckNode(Deaf(one.link._bus, one.clock, peer=one.emulator), one.clock, 1)
+    node = PuckNode(
+        Deaf(one.link._bus, one.clock, PuckOptions(), peer=one.emulator), one.clock, 1
+    )
     begun_ns = one.clock.now_ns()
     with pytest.raises(DeviceError, match=r"cannot be read .* SWITCH ITS SUPPLY OFF"):
         release(node, torque_id=T, mode_id=MODE)

@@ -189,7 +189,7 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
     "code",
     [
         "import masrel.lab.hess.puck",
-        "import masrel.lab.hess.puck._bus",
+        "import masrel.lab.hess._can",
         "from masrel.lab.hess.puck import fit_friction, steady_runs",
         "from masrel.lab.hess.puck import PuckOptions; PuckOptions()",
         "from masrel.cli import cli\ntry: cli(['device', '-h'])\nexcept SystemExit: 0",

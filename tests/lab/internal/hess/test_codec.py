@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from masrel.errors import BusError, FrameError
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, trace
 from masrel.lab.hess import RealClock
-from masrel.lab.hess.puck import Frame, Link
+from masrel.lab.hess.puck import Frame, Link, PuckOptions
 from masrel.lab.hess.puck._bus import (
     POSITION_GROUP,
     PROPERTY_GROUP,
@@ -24,11 +24,10 @@ from masrel.lab.hess.puck._bus import (
     encode_position,
     encode_value,
     from_node,
-    open_link,
     reply_identifiers,
 )
 from masrel.lab.hess.puck._puck_options import Transmission
-from tests.lab.hess.puck.rig import PUCK
+from tests.lab.hess.puck.rig import PUCK, open_link
 from tests.lab.hess.rig import END, MODELS, START, controls
 
 int32 = st.integers(-(2**31), 2**31 - 1)
@@ -273,7 +272,7 @@ def test_a_bus_that_cannot_be_left_hides_no_error_before(before, said: str) -> N
             raise can.CanOperationError("no such port")
 
     def leave() -> None:
-        with Link(Stuck(channel="stuck"), RealClock()):
+        with Link(Stuck(channel="stuck"), RealClock(), PuckOptions()):
             if before is not None:
                 raise BusError(before)
 

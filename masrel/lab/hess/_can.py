@@ -1,0 +1,406 @@
+"""An amplifier's CAN bus by python-can: frames, one end of a bus, and a node on it.
+
+This is the only module that imports python-can: each of its errors becomes a
+`BusError`, and every wait ends at a time on the loop's clock.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType, TracebackType
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self
+
+from masrel.errors import (
+    BusError,
+    DeviceError,
+    DeviceTimeoutError,
+    FrameError,
+    ParameterError,
+)
+from masrel.lab.hess._clock import Clock
+from masrel.lab.hess.device import BackendOptions
+
+if TYPE_CHECKING:
+    import can  # loaded when a bus is opened
+
+_BITRATE, _DATA_BITRATE = 1_000_000, 5_000_000  # bits a second; the latter of CAN-FD
+
+# Classes of error in the identifier of SocketCAN's error frames (linux/can/error.h)
+BUS_OFF, BUS_RESTARTED = 0x040, 0x100
+
+# What python-can's interfaces raise, beside its own `CanError`, when an adapter or its
+# maker's library is missing, or a channel is not enough
+_NOT_OPENED = (
+    ImportError,
+    NameError,
+    NotImplementedError,
+    OSError,
+    TypeError,
+    ValueError,
+)
+
+_FILTERS_IN_KERNEL = frozenset({"socketcan"})
+_WITHOUT_HARDWARE = frozenset({"virtual", "udp_multicast"})
+
+# python-can's "virtual" is inside this process, and most makers' adapters belong to
+# whoever opened them: on others no other process can idle an amplifier.
+_SHARED = frozenset({"socketcan", "udp_multicast"})
+
+_MAX_WAITING = 1000  # frames; more than fit on the bus in 50 ms
+_MAX_OVERDUE = 30  # more than fit on the bus in 1 ms
+_MAX_ERROR_FRAMES = 10  # on a bus of one joint there should be none
+
+_PATIENCE_S = 0.1  # to let go; also what a bus needs that restarts itself after bus off
+_PAUSE_S = 0.001  # between two attempts
+
+
+class Frame(NamedTuple):
+    """One frame of the bus.
+
+    Attributes
+    ----------
+    identifier : int
+        Identifier of 11 bits, with CAN-FD of 29; for an error frame the class of error.
+    data : bytes
+        Up to eight bytes, with CAN-FD 64.
+    is_error : bool
+        Whether the controller reports an error with it.
+    """
+
+    identifier: int
+    data: bytes
+    is_error: bool = False
+
+
+class Peer(Protocol):
+    """An emulated amplifier in the same thread."""
+
+    def serve(self) -> None:
+        """Do what is due by now, and take in the frames that wait."""
+
+    def next_due_ns(self) -> int | None:
+        """Return when it will act next."""
+
+    def close(self) -> None:
+        """Leave the bus."""
+
+
+class Link:
+    """One end of a bus, as `connected` opens it; a context manager that leaves it.
+
+    Parameters
+    ----------
+    bus : can.BusABC
+        An open bus.
+    clock : Clock
+        The clock of deadlines.
+    options : BusOptions
+        Whose bus it is.
+    peer : Peer or None, optional
+        An emulator in the same thread, which is served whenever this end sends or
+        waits, so that a bus works on a simulated clock too, and closed with it.
+
+    Attributes
+    ----------
+    peer : Peer or None
+        That emulator.
+    """
+
+    def __init__(
+        self,
+        bus: "can.BusABC",
+        clock: Clock,
+        options: "BusOptions",
+        *,
+        peer: Peer | None = None,
+    ) -> None:
+        self._can = _python_can(options.name)
+        self._name, self._is_fd = options.name, options.is_fd
+        self._bus = bus
+        self._clock = clock
+        self.peer = peer
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self.close()
+        except BusError:
+            if error is None:  # an error inside the block matters more
+                raise
+
+    def send(self, frame: Frame) -> int:
+        """Send a frame to the bus.
+
+        Parameters
+        ----------
+        frame : Frame
+            What to send.
+
+        Returns
+        -------
+        int
+            When it was handed to the bus, ns.
+
+        Raises
+        ------
+        BusError
+            If the bus does not take it.
+        """
+        message = self._can.Message(
+            arbitration_id=frame.identifier,
+            data=frame.data,
+            is_extended_id=self._is_fd,
+            is_fd=self._is_fd and not frame.is_error,
+            bitrate_switch=self._is_fd and not frame.is_error,
+            is_error_frame=frame.is_error,
+        )
+        now_ns = self._clock.now_ns()
+        try:
+            self._bus.send(message)
+        except (self._can.CanError, OSError) as error:
+            raise BusError(f"{self._name}: the bus takes no frame ({error})") from error
+        if self.peer is not None:
+            self.peer.serve()
+        return now_ns
+
+    def receive(self, deadline_ns: int) -> Frame | None:
+        """Wait for a frame.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            When to give up, ns; a time that has passed takes what is there already.
+
+        Returns
+        -------
+        Frame or None
+            The oldest that has not been received yet; None when none came.
+
+        Raises
+        ------
+        BusError
+            If the bus cannot be read.
+        """
+        if self.peer is None:
+            left_ns = deadline_ns - self._clock.now_ns()
+            return self._next_frame(max(0.0, left_ns * 1e-9))
+        while True:
+            self.peer.serve()
+            frame = self._next_frame(0.0)
+            if frame is not None:
+                return frame
+            due_ns = self.peer.next_due_ns()
+            if due_ns is None or due_ns > deadline_ns:
+                self._clock.sleep_until_ns(deadline_ns)
+                self.peer.serve()
+                return None
+            self._clock.sleep_until_ns(due_ns)
+
+    def close(self) -> None:
+        """Leave the bus; doing it twice does nothing more.
+
+        Raises
+        ------
+        BusError
+            If the adapter does not let go.
+        """
+        try:
+            self._bus.shutdown()
+        except (self._can.CanError, OSError) as error:
+            raise BusError(f"{self._name}: the bus cannot be left ({error})") from error
+        finally:
+            if self.peer is not None:
+                self.peer.close()
+
+    def _next_frame(self, timeout_s: float) -> Frame | None:
+        # A timeout of 0 does not wait.
+        try:
+            message = self._bus.recv(timeout_s)
+        except (self._can.CanError, OSError) as error:
+            raise BusError(f"{self._name}: the bus cannot be read ({error})") from error
+        if message is None:
+            return None
+        if message.is_error_frame:
+            return Frame(message.arbitration_id, bytes(message.data), is_error=True)
+        if message.is_extended_id > self._is_fd or message.is_remote_frame:
+            return Frame(0, b"")  # not of this bus; from the host to the host
+        return Frame(message.arbitration_id, bytes(message.data))
+
+
+def _python_can(name: str) -> ModuleType:
+    try:
+        import can
+    except ImportError as error:
+        raise DeviceError(
+            f"{name}: needs python-can; install it with: pip install 'masrel[can]'"
+        ) from error
+    return can
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BusOptions(BackendOptions):
+    """On which bus an amplifier is; its backend's own options are a subclass."""
+
+    name: ClassVar[str]  # of the backend
+    is_fd: ClassVar[bool] = False  # whether its frames are those of CAN-FD
+
+    interface: str = "socketcan"
+    channel: str = "can0"
+
+    @property
+    def moves_hardware(self) -> bool:
+        """Whether a motor may be on this bus.
+
+        There is none on python-can's "virtual" and "udp_multicast", nor on a network
+        device whose name begins with "vcan".
+        """
+        return self.interface not in _WITHOUT_HARDWARE and not self.channel.startswith(
+            "vcan"
+        )
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether another process can join the bus."""
+        return self.interface in _SHARED
+
+    def open_link(
+        self,
+        clock: Clock,
+        *,
+        accepted: tuple[int, ...] | None = None,
+        peer: Peer | None = None,
+    ) -> Link:
+        """Open one end of a bus; `accepted` identifiers are filtered in the kernel."""
+        # Where no kernel filters, whoever receives looks at the identifiers: filters of
+        # python-can would drop error frames too.
+        can = _python_can(self.name)
+        filters: list[dict[str, Any]] | None = None
+        if accepted is not None and self.interface in _FILTERS_IN_KERNEL:
+            # an answer by CAN-FD may have either kind of identifier
+            kind = {"can_mask": 0x1FFFFFFF}
+            if not self.is_fd:
+                kind = {"can_mask": 0x7FF, "extended": False}
+            filters = [{"can_id": identifier, **kind} for identifier in accepted]
+        try:
+            bus = can.Bus(
+                interface=self.interface,
+                can_filters=filters,
+                ignore_config=True,  # no file of python-can's changes what is opened
+                **self._bus_arguments(),
+            )
+        except (can.CanError, *_NOT_OPENED) as error:
+            raise BusError(
+                f"{self.name}: cannot open channel {self.channel!r} of interface "
+                f"{self.interface!r} ({error})"
+            ) from error
+        return Link(bus, clock, self, peer=peer)
+
+    def _bus_arguments(self) -> dict[str, Any]:
+        if self.interface != "udp_multicast":
+            fd = {"fd": True, "data_bitrate": _DATA_BITRATE} if self.is_fd else {}
+            return {"channel": self.channel, "bitrate": _BITRATE, **fd}
+        # The bus is for processes of one machine: its packets do not leave it. The
+        # channel is a group, or an IPv4 group, a colon and a port.
+        arguments: dict[str, Any] = {"channel": self.channel, "hop_limit": 0}
+        group, colon, port = self.channel.partition(":")
+        if colon and port.isdecimal():
+            arguments.update(channel=group, port=int(port))
+        return arguments
+
+
+class Node(ABC):
+    """One amplifier, as this end of the bus speaks to it."""
+
+    def __init__(self, link: Link, clock: Clock, name: str) -> None:
+        self.link = link
+        self.clock = clock
+        self.name = name  # in messages
+        self._n_overdue = 0  # frames that came after the deadline
+        self.n_foreign = self.n_errors = 0  # frames
+
+    @abstractmethod
+    def _sort(self, frame: Frame) -> None:
+        """Take in a frame that is no error."""
+
+    def _receive_until(self, is_there: Callable[[], bool], deadline_ns: int) -> bool:
+        # Whether what is waited for came in time
+        self._n_overdue = 0
+        while not is_there():
+            frame = self._next_frame(deadline_ns)
+            if frame is None:
+                return False
+            self._take_in(frame)
+        return True
+
+    def _next_frame(self, deadline_ns: int) -> Frame | None:
+        # What waits is taken after the deadline too, because this end may be late;
+        # but only so many frames, because others may never fall silent.
+        if self.clock.now_ns() > deadline_ns:
+            self._n_overdue += 1
+            if self._n_overdue > _MAX_OVERDUE:
+                return None
+        return self.link.receive(deadline_ns)
+
+    def receive_waiting(self) -> None:
+        """Receive all frames that wait: late replies, errors, frames of others."""
+        for _ in range(_MAX_WAITING):
+            frame = self.link.receive(0)
+            if frame is None:
+                return
+            self._take_in(frame)
+        raise BusError(f"{self.name}: the bus is flooded with frames", "flooded")
+
+    def _take_in(self, frame: Frame) -> None:
+        if not frame.is_error:
+            self._sort(frame)
+        elif frame.identifier & BUS_RESTARTED:
+            return
+        elif frame.identifier & BUS_OFF:
+            raise BusError(
+                f"{self.name}: bus off, the host's controller has given up", "bus-off"
+            )
+        else:
+            self._count_error(frame.identifier)
+
+    def _count_error(self, error_class: int) -> None:
+        self.n_errors += 1
+        if self.n_errors > _MAX_ERROR_FRAMES:
+            raise BusError(
+                f"{self.name}: needs at most {_MAX_ERROR_FRAMES} error frames, "
+                f"the bus has reported {self.n_errors}, the last of class "
+                f"{error_class:#05x}",
+                "error-frames",
+            )
+
+    def wait(self, duration_s: float) -> None:
+        """Let time pass without sending a frame."""
+        self.clock.sleep_until_ns(self.clock.now_ns() + round(duration_s * 1e9))
+
+    def insist(self, attempt: Callable[[float], bool], advice: str) -> None:
+        """Try to let go, again and again, until it is confirmed."""
+        # The attempt is told for how long it has failed, s
+        start_ns = self.clock.now_ns()
+        reason = "it does not go to idle"
+        while (since_s := (self.clock.now_ns() - start_ns) * 1e-9) < _PATIENCE_S:
+            try:
+                if attempt(since_s):
+                    return
+            except (BusError, DeviceTimeoutError, FrameError) as error:
+                reason = str(error)
+            self.wait(_PAUSE_S)
+        raise DeviceError(
+            f"{self.name}: not idle after {_PATIENCE_S * 1e3:g} ms ({reason}); {advice}"
+        )
+
+
+def check_direction(direction: int) -> None:
+    """Refuse a direction that is neither with nor against extension."""
+    if direction not in (1, -1):
+        raise ParameterError(f"direction: needs 1 or -1, got {direction}")
