@@ -1,7 +1,6 @@
 """Faults injected and survived: ``python -m tests.faults`` runs and counts all.
 
-The counts go into ``docs/explanation/record.md`` and, with date and commit, into
-``docs/development/long_tests.md``.
+The counts go into ``docs/development/long_tests.md``, with date and commit.
 """
 
 import subprocess

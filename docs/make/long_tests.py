@@ -1,9 +1,8 @@
 """The page of the last run by hand of every slow and long test.
 
 ``python -m docs.make.long_tests JUNIT_XML`` writes the table of tests on
-``docs/development/long_tests.md``, and the counts of injected faults there and into
-``docs/explanation/record.md``; ``python -m tests.mutants`` the table of deliberate
-faults.
+``docs/development/long_tests.md`` and the counts of injected faults;
+``python -m tests.mutants`` writes the table of deliberate faults.
 """
 
 import subprocess
@@ -15,7 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 PAGE = Path(__file__).parents[1] / "development" / "long_tests.md"
-RECORD = Path(__file__).parents[1] / "explanation" / "record.md"
+RECORD = Path(__file__).parents[1] / "evidence" / "record.md"
 TESTS = "<!-- table of tests -->\n", "<!-- end of the tests -->\n"
 FAULTS = "<!-- counts of faults -->\n", "<!-- end of the counts -->\n"
 MUTANTS = "<!-- deliberate faults -->\n", "<!-- end of the deliberate faults -->\n"
@@ -43,7 +42,7 @@ def write_tests(junit: Path) -> None:
 
 
 def write_faults(junit: Path) -> str:
-    """Write the counts of injected faults into both pages, and return them."""
+    """Write the counts of injected faults and return them."""
     counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
     for entry in ElementTree.parse(junit).iter("property"):
         if entry.attrib["name"] == "faults":
@@ -55,7 +54,6 @@ def write_faults(junit: Path) -> str:
     table = "\n".join(lines) + "\n"
     when = f"`python -m tests.faults`, which `.ci/long` runs too, {_when()}:\n\n"
     _put(PAGE, FAULTS, when + table)
-    _put(RECORD, FAULTS, table)
     return table
 
 

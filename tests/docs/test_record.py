@@ -1,4 +1,4 @@
-"""Every promise of docs/explanation/record.md is held by the test in its line."""
+"""Every promise of docs/evidence/record.md is held by the test in its line."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]
-    for line in (ROOT / "docs/explanation/record.md")
+    for line in (ROOT / "docs/evidence/record.md")
     .read_text(encoding="utf-8")
     .splitlines()
     if re.match(r"\| (curious|careless|dishonest|hostile)", line)

@@ -1,7 +1,7 @@
 """Forgeries of a whole record and of a sealed one: what is found, and what is not.
 
 ``python -m tests.lab.flow.test_forgeries`` writes the table into
-``docs/explanation/record.md``.
+``docs/evidence/record.md``.
 """
 
 import hashlib

@@ -104,7 +104,7 @@ def test_codes_say_nothing_about_the_order_over_secrets() -> None:
     assert chi_square < 85.6
 
 
-# The test vector of docs/explanation/record.md, from HMAC-SHA256 and PCG64 in Python
+# The test vector of docs/reference/protocol.md, from HMAC-SHA256 and PCG64 in Python
 # integers.
 VECTOR_ORDER = "HM3 HM1 D04 D02 HM2 D03 D01 HM4"
 VECTOR_CODES = "75M 36H 28M 66B 85Y 36U 94K 46A"
