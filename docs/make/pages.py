@@ -38,7 +38,7 @@ from unittest import mock
 from masrel.cli import main
 
 ROOT = Path(__file__).parents[2]
-SHOWN_ONLY = {"", "text", "toml"}  # formulas, excerpts of files
+SHOWN_ONLY = {"", "text", "toml", "{eval-rst}"}  # formulas, excerpts of files
 PROGRAMS = re.compile(r"(>>>|\S*(masrel|python3?|pip|git|sudo)) ")
 PRINTS = re.compile(r"# prints\b.*")
 

@@ -362,7 +362,7 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     -----
     Gwet's interval membership probability [1]_: the normal distribution around the
     estimate, cut to [-1, 1], or at 1 only for an estimate below -1, which weights and
-    few ratings allow. The words themselves [2-5]_ are conventions and no more.
+    few ratings allow. The words themselves [2]_ to [5]_ are conventions and no more.
 
     References
     ----------

@@ -414,7 +414,8 @@ def specific_agreement(table: ArrayLike) -> tuple[float, ...]:
     Returns
     -------
     tuple of float, length n_categories
-        2 t_kk / (t_k. + t_.k), within [0, 1]; ``nan`` for a category that nobody used.
+        ``2 t_kk / (t_k. + t_.k)``, within [0, 1]; ``nan`` for a category that nobody
+        used.
         Of two categories, negative and positive agreement.
 
     Raises

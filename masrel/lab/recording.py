@@ -65,12 +65,13 @@ RECORDING_COLUMNS = (
     "ramp",  # position in RAMPS
     "stretch",  # which one goes on: 1, 2, ...; 0 before, between and after
 )
+"""Columns of a recording, in their order."""
+
 _FORMAT = 1  # version of the files of a recording; facts without one are of version 1
 
 _FIRST_COLUMNS = frozenset(RECORDING_COLUMNS[:6])  # those of every recording
 
-_CATCH = PHASES.index("catch")
-_END, _FAULT = RAMPS.index("end"), RAMPS.index("fault")
+_CATCH, _END, _FAULT = PHASES.index("catch"), RAMPS.index("end"), RAMPS.index("fault")
 _USUAL_THRESHOLD_DEG_S = 20.0  # before recordings said what theirs was
 
 _Columns = Mapping[str, NDArray[np.float64]]

@@ -1,4 +1,4 @@
-"""Every link of a page leads somewhere."""
+"""Every link of a page leads somewhere, and every page is found."""
 
 import re
 from pathlib import Path
@@ -7,6 +7,7 @@ import pytest
 
 from docs.make.pages import ROOT, pages
 from masrel import plots
+from masrel.cli import GROUPS
 
 PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 
@@ -37,6 +38,26 @@ def test_every_file_and_heading_that_a_page_points_to_is_there(name: str) -> Non
         or (heading and heading not in anchors(target))
     ]
     assert broken == []
+
+
+def test_every_page_is_two_clicks_from_the_start() -> None:
+    near = {ROOT / "docs" / "index.md"}
+    for _ in range(2):
+        near |= {
+            (p.parent / file).resolve() for p in near for file, _ in links(p) if file
+        }
+        near = {page for page in near if page.suffix == ".md"}
+    site = {page for page in PAGES.values() if page.parent != ROOT}
+    assert [str(page) for page in sorted(site - near)] == []
+
+
+def test_every_command_is_on_a_page() -> None:
+    folder = ROOT / "docs" / "reference" / "commands"
+    text = "".join(
+        (folder / f"{n}.md").read_text() for n in ("ratings", "study", "joint")
+    )
+    commands = [command for group in GROUPS.values() for command in group]
+    assert re.findall(r":prog: masrel (\w+)$", text, re.M) == commands
 
 
 def test_every_picture_is_in_the_gallery() -> None:

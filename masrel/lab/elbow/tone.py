@@ -107,7 +107,7 @@ class LeadPipe(ToneModel):
 
     τ = K·(θ - θ0) + B·ω + F·z/z_c, where the bristle follows the arm and slips at ±z_c:
     z ← clip(z + Δθ, -z_c, z_c), 0 in the beginning. The bristle does not depend on the
-    speed and holds the limb where it is put, as long as K·|θ - θ0| is at most F.
+    speed and holds the limb where it is put, as long as ``K·|θ - θ0|`` is at most F.
 
     Attributes
     ----------
