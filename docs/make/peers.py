@@ -640,7 +640,7 @@ def opening(comparisons: list[Comparison], versions: Mapping[str, str]) -> list[
         f"{len(comparisons) - len(whys)} are ours, but for the last digits of floats, "
         "or as far as they are computed (psych and lme4 by steps, 5 · 10⁻⁶) or printed "
         f"(pingouin's ends, two decimals). {n_again} are had again by "
-        "[`--convention`](../howto/coming_from.md#old-numbers-had-again), which is "
+        "[`--convention`](../howto/old_numbers.md), which is "
         "checked; the others are explained [below](#why).",
         'masrel\'s are those of `masrel.agree(file, target="items")` with the declared '
         'categories and `Estimating(interval="analytic")`, whose t is also irrCAC\'s; '
