@@ -17,7 +17,7 @@ The tree::
         ├── DeviceTimeoutError (TimeoutError)
         ├── BusError                     the device's bus failed
         ├── FrameError (ValueError)      bytes on a bus mean nothing
-        ├── IdledError                   somebody else switched the device to idle
+        ├── IdledError                   the device takes no more torques
         ├── EmergencyStopError           somebody, or the device, stopped it at once
         ├── ControllerError              the controller failed
         └── LimitExceededError
@@ -175,9 +175,19 @@ class FrameError(DeviceError, ValueError):
 
 
 class IdledError(DeviceError):
-    """Somebody else switched the device to idle: it takes no more torques."""
+    """The device takes no more torques: somebody idled it, or it stopped itself.
 
-    kind = "idled"
+    Parameters
+    ----------
+    message : str
+        What happened.
+    kind : str, optional
+        Why it is idle.
+    """
+
+    def __init__(self, message: str, kind: str = "idled") -> None:
+        super().__init__(message)
+        self.kind = kind
 
 
 class LimitExceededError(DeviceError):

@@ -61,7 +61,7 @@ GROUPS = {
     },
     "Joint and device": {
         "joint": "Traces of joints, joints of recordings, and models between.",
-        "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
+        "device": "Bring a motor up on its CAN bus: probe, check, zero, friction.",
     },
 }
 """Commands with their summaries, as --help shows them."""

@@ -1,4 +1,4 @@
-"""``masrel device``: bring a Puck up on its CAN bus and see what it says."""
+"""``masrel device``: bring an amplifier up on its CAN bus and see what it says."""
 
 import dataclasses
 import functools
@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NoReturn
 
 import click
@@ -22,35 +23,45 @@ from masrel.lab.hess import (
     RealClock,
     SimulatedClock,
     SimulatedHand,
+    moteus,
     open_device,
+    puck,
 )
-from masrel.lab.hess._free_arm import LIMITS, SPEEDS
+from masrel.lab.hess._can import Link
+from masrel.lab.hess._free_arm import LIMITS, SPEEDS, fit_friction, steady_runs
 from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
-from masrel.lab.hess.puck import (
-    Link,
-    NodeReport,
-    PuckOptions,
-    check,
-    connected,
-    fit_friction,
-    probe,
-    read_property_table,
-    steady_runs,
-    zero,
-)
+from masrel.lab.hess.moteus import MoteusOptions
+from masrel.lab.hess.puck import PuckOptions, read_property_table
 
-_N_NODES = 31
+_N_NODES = {"puck": 31, "moteus": 127}
+_BACKENDS: dict[str, ModuleType] = {"puck": puck, "moteus": moteus}
+_UNITS = {"puck": "counts", "moteus": "turns"}  # of a position
 _RANGE_END = math.radians(146.0)  # where an emulated arm meets its end stop
 _EMULATED_START = math.radians(60.0)
 
-_puck_options = several(
+_device_options = several(
+    click.option(
+        "--device",
+        "name",
+        type=click.Choice(list(_BACKENDS)),
+        default="puck",
+        show_default=True,
+        help="Which amplifier.",
+    ),
     click.option(
         "--interface",
         help="The adapter, as python-can names it; default: socketcan, with --emulate "
         "virtual.",
     ),
     click.option("--channel", default="can0", show_default=True, help="Its channel."),
-    click.option("--puck", type=int, default=1, show_default=True, help="Its node."),
+    click.option(
+        "--node",
+        "--puck",
+        type=int,
+        default=1,
+        show_default=True,
+        help="Its number on the bus.",
+    ),
     click.option(
         "--direction",
         type=click.Choice(["1", "-1"]),
@@ -58,14 +69,20 @@ _puck_options = several(
         show_default=True,
         help="-1 where its counts shrink with extension.",
     ),
-    click.option("--gear-ratio", type=float, default=18.8, show_default=True),
+    click.option(
+        "--gear-ratio",
+        type=float,
+        help="Turns of the motor, or of a moteus' output, for one of the elbow; "
+        "default: 18.8 and 1.",
+    ),
     click.option(
         "--properties",
         type=InputFile(path_type=Path),
-        help="TOML file with the property numbers of a firmware unknown to masrel.",
+        help="TOML file with the property numbers of a puck's firmware that is unknown "
+        "to masrel.",
     ),
     click.option(
-        "--emulate", is_flag=True, help="Emulate the puck; there is no hardware then."
+        "--emulate", is_flag=True, help="Emulate it; there is no hardware then."
     ),
     output_options(
         json="Write what was found as JSON; - for the screen.", quiet="No progress bar."
@@ -75,23 +92,30 @@ _puck_options = several(
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class _Session:
-    """A puck, and the screen or file that its results go to."""
+    """An amplifier, and the screen or file that its results go to."""
 
-    options: PuckOptions  # bus, node and how to treat it
-    clock: Clock  # simulated for an emulated puck
-    # what holds the arm of an emulated puck: a hand that has let go
+    name: str  # of its backend
+    options: PuckOptions | MoteusOptions  # bus, node and how to treat it
+    clock: Clock  # simulated for an emulated one
+    # what holds the arm of an emulated one: a hand that has let go
     hand: SimulatedHand | None
     output: OutputOptions  # where its results go
 
+    @property
+    def backend(self) -> ModuleType:
+        """What brings it up."""
+        return _BACKENDS[self.name]
+
     def link(self, *, all_nodes: bool = False) -> Link:
         """Join the bus, for a ``with`` block."""
-        return connected(
+        link: Link = self.backend.connected(
             self.options,
             clock=self.clock,
             hand=self.hand,
             range_end=_RANGE_END,
             all_nodes=all_nodes,
         )
+        return link
 
     def progress(self, total: int) -> "tqdm[NoReturn]":
         """Make a bar of steps on a terminal, for a ``with`` block."""
@@ -109,17 +133,18 @@ class _Session:
         )
 
 
-def _puck_command(function: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options that say which puck it is for, as a session."""
+def _device_command(function: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options that say which amplifier it is for, as a session."""
 
     @functools.wraps(function)
     def command(
         *,
+        name: str,
         interface: str | None,
         channel: str,
-        puck: int,
+        node: int,
         direction: str,
-        gear_ratio: float,
+        gear_ratio: float | None,
         properties: Path | None,
         emulate: bool,
         output: OutputOptions,
@@ -128,15 +153,22 @@ def _puck_command(function: Callable[..., None]) -> Callable[..., None]:
         hand = SimulatedHand(
             start=_EMULATED_START, end=_RANGE_END, mean_speed=1.0, slip_time=0.0
         )
-        options = PuckOptions(
-            interface=interface or ("virtual" if emulate else "socketcan"),
-            channel=channel,
-            puck=puck,
-            gear_ratio=gear_ratio,
-            direction=1 if direction == "1" else -1,
-            properties=None if properties is None else read_property_table(properties),
-        )
+        settings: dict[str, Any] = {
+            "interface": interface or ("virtual" if emulate else "socketcan"),
+            "channel": channel,
+            "direction": 1 if direction == "1" else -1,
+            **({} if gear_ratio is None else {"gear_ratio": gear_ratio}),
+        }
+        options: PuckOptions | MoteusOptions
+        if name == "moteus":
+            if properties is not None:
+                raise click.UsageError("--properties is for a puck")
+            options = MoteusOptions(servo=node, **settings)
+        else:
+            table = None if properties is None else read_property_table(properties)
+            options = PuckOptions(puck=node, properties=table, **settings)
         session = _Session(
+            name=name,
             options=options.emulated(_EMULATED_START) if emulate else options,
             clock=SimulatedClock() if emulate else RealClock(),
             hand=hand if emulate else None,
@@ -144,7 +176,7 @@ def _puck_command(function: Callable[..., None]) -> Callable[..., None]:
         )
         function(session, **kwargs)
 
-    return _puck_options(command)
+    return _device_options(command)
 
 
 @click.group("device", cls=Commands)
@@ -158,18 +190,16 @@ def device() -> None:
 
 
 @device.command("probe")
-@_puck_command
+@_device_command
 def _probe(session: _Session) -> None:
     """Ask every node who it is; nothing is set and nobody is woken."""
-    with session.link(all_nodes=True) as link, session.progress(_N_NODES) as bar:
-        reports = probe(
-            link,
-            session.clock,
-            properties=session.options.properties,
-            progress=bar.update,
+    n_nodes = _N_NODES[session.name]
+    with session.link(all_nodes=True) as link, session.progress(n_nodes) as bar:
+        reports = session.backend.probe(
+            link, session.clock, session.options, progress=bar.update
         )
     session.write_output(
-        [_report_line(report) for report in reports] or ["nobody answers"],
+        [str(report) for report in reports] or ["nobody answers"],
         {"found": [dataclasses.asdict(report) for report in reports]},
     )
     if not reports:
@@ -177,15 +207,16 @@ def _probe(session: _Session) -> None:
 
 
 @device.command("check")
-@_puck_command
+@_device_command
 def _check(session: _Session) -> None:
-    """Wake a puck and see whether it can be driven. The arm must be at rest.
+    """See whether an amplifier can be driven. The arm must be at rest.
 
-    It is told its groups and torque limit, goes into torque mode for some
-    milliseconds with no more than 0.007 N·m, and is idle afterwards.
+    A puck is woken, told its groups and torque limit, and in torque mode for some
+    milliseconds with no more than 0.007 N·m. A moteus is told no torque, and then
+    nothing, so that its watchdog must let go. Both are idle afterwards.
     """
     with session.link() as link:
-        checks = check(link, session.clock, session.options)
+        checks = session.backend.check(link, session.clock, session.options)
     holds = all(one.holds for one in checks)
     session.write_output(
         [
@@ -211,16 +242,17 @@ def _check(session: _Session) -> None:
     required=True,
     help="Where the arm is held now, 0 at full flexion.",
 )
-@_puck_command
+@_device_command
 def _zero(session: _Session, angle_deg: float) -> None:
-    """Tell a puck where the arm is; it forgets when its supply is switched off."""
+    """Tell it where the arm is; it forgets when its supply is switched off."""
     with session.link() as link:
-        counts = zero(
+        position = session.backend.zero(
             link, session.clock, session.options, angle=math.radians(angle_deg)
         )
+    unit = _UNITS[session.name]
     session.write_output(
-        [f"the arm is at {angle_deg:g} deg: {counts} counts"],
-        {"angle_deg": angle_deg, "counts": counts},
+        [f"the arm is at {angle_deg:g} deg: {position:.8g} {unit}"],
+        {"angle_deg": angle_deg, unit: position},
     )
 
 
@@ -230,7 +262,7 @@ def _zero(session: _Session, angle_deg: float) -> None:
     is_flag=True,
     help="Say that nobody holds the arm and nothing is in its way: IT MOVES.",
 )
-@_puck_command
+@_device_command
 def _friction(session: _Session, arm_is_free: bool) -> None:
     """Turn the free arm at steady speeds and fit B and β of equation (7).
 
@@ -247,7 +279,7 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
         stop_on_signals(stop),
         stop_on_key(stop, keys),
         open_device(
-            "puck",
+            session.name,
             clock=session.clock,
             hand=session.hand,
             range_end=_RANGE_END,
@@ -275,16 +307,4 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
             f"offset = {estimate.offset:.4f} ± {estimate.offset_error:.4f} N·m",
         ],
         dataclasses.asdict(estimate),
-    )
-
-
-def _report_line(report: NodeReport) -> str:
-    if report.firmware is None:
-        return f"puck {report.puck}: {report.kind}"
-    state = "awake" if report.is_awake else "asleep"
-    support = "" if report.is_supported else ", NOT SUPPORTED"
-    values = "".join(f", {name} {value}" for name, value in report.properties.items())
-    return (
-        f"puck {report.puck}: {report.kind}, firmware {report.firmware}, "
-        f"{state}{support}{values}"
     )

@@ -4,11 +4,13 @@ This is the only module that imports python-can: each of its errors becomes a
 `BusError`, and every wait ends at a time on the loop's clock.
 """
 
+import itertools
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType, TracebackType
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
 
 from masrel.errors import (
     BusError,
@@ -17,8 +19,9 @@ from masrel.errors import (
     FrameError,
     ParameterError,
 )
-from masrel.lab.hess._clock import Clock
-from masrel.lab.hess.device import BackendOptions
+from masrel.lab.hess._clock import Clock, SimulatedClock
+from masrel.lab.hess.device import BackendOptions, DeviceSetup
+from masrel.lab.hess.limits import DeviceLimits
 
 if TYPE_CHECKING:
     import can  # loaded when a bus is opened
@@ -245,7 +248,7 @@ def _python_can(name: str) -> ModuleType:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BusOptions(BackendOptions):
+class BusOptions(BackendOptions, ABC):
     """On which bus an amplifier is; its backend's own options are a subclass."""
 
     name: ClassVar[str]  # of the backend
@@ -253,6 +256,18 @@ class BusOptions(BackendOptions):
 
     interface: str = "socketcan"
     channel: str = "can0"
+    emulator: object | None = None  # what an emulated one is like
+
+    def __post_init__(self) -> None:
+        if self.emulator is not None and self.interface != "virtual":
+            raise ParameterError(
+                f"interface: needs 'virtual' for an emulated {self.name}, "
+                f"got {self.interface!r}"
+            )
+
+    @abstractmethod
+    def emulated(self, start: float) -> Self:
+        """Return the same for an emulated one, whose arm is held somewhere, rad."""
 
     @property
     def moves_hardware(self) -> bool:
@@ -371,7 +386,7 @@ class Node(ABC):
 
     def _count_error(self, error_class: int) -> None:
         self.n_errors += 1
-        if self.n_errors > _MAX_ERROR_FRAMES:
+        if self.n_errors % (_MAX_ERROR_FRAMES + 1) == 0:  # it can be let go between two
             raise BusError(
                 f"{self.name}: needs at most {_MAX_ERROR_FRAMES} error frames, "
                 f"the bus has reported {self.n_errors}, the last of class "
@@ -397,6 +412,44 @@ class Node(ABC):
             self.wait(_PAUSE_S)
         raise DeviceError(
             f"{self.name}: not idle after {_PATIENCE_S * 1e3:g} ms ({reason}); {advice}"
+        )
+
+
+_Options = TypeVar("_Options", bound=BusOptions)
+_channels = itertools.count(1)
+
+
+def options_of(setup: DeviceSetup, kind: type[_Options]) -> _Options:
+    """Return the options of a setup: an emulator's when there is a hand, or refuse."""
+    options, hand, name = setup.options, setup.hand, kind.name
+    if options is None:
+        if hand is None:
+            raise DeviceError(f"{name}: needs options that say on which bus it is")
+        # A bus that nobody else is on
+        channel = f"masrel-{next(_channels)}"
+        options = kind(interface="virtual", channel=channel).emulated(hand.start)
+    if not isinstance(options, kind):
+        got = type(options).__name__
+        raise DeviceError(f"{name}: needs options of type {kind.__name__}, got {got}")
+    if (hand is None) != (options.emulator is None):
+        raise DeviceError(
+            f"{name}: needs a simulated hand with an emulated {name} and none without, "
+            "got " + ("an emulator alone" if hand is None else "a hand alone")
+        )
+    if hand is None and isinstance(setup.clock, SimulatedClock):
+        raise DeviceError(
+            f"{name}: needs a real clock, its bus is outside this process"
+        )
+    return options
+
+
+def check_angle(name: str, angle: float) -> None:
+    """Refuse an arm that is where no elbow can be."""
+    limits = DeviceLimits()
+    if not limits.lowest_angle <= angle <= limits.highest_angle:
+        raise DeviceError(
+            f"{name}: needs an arm between -5 and 185 deg, it reports "
+            f"{math.degrees(angle):.1f}; run masrel device zero"
         )
 
 

@@ -114,13 +114,11 @@ class InjectedFault:
 class Motor:
     """A simulated arm, driven by a torque or resisted by what an idle motor does."""
 
-    def __init__(
-        self, hand: Hand, range_end: float, damping: float, most: float = math.inf
-    ) -> None:
-        # idle: N·m·s/rad, and N·m. The quantum is that of the bus.
+    def __init__(self, hand: Hand, range_end: float) -> None:
+        # The quantum is that of the bus
         parameters = PlantParameters(range_end=range_end, torque_step=0.0)
         self.plant = Plant(hand, parameters)
-        self._damping, self._most = damping, most
+        self._damping, self._most = 0.0, math.inf  # idle: N·m·s/rad, and N·m
         self._has_moved = self._is_driven = False
 
     def angle(self, now_ns: int) -> float:
@@ -137,12 +135,11 @@ class Motor:
         self._is_driven = True
         self.plant.command(torque_nm, now_ns)
 
-    def brake(self, now_ns: int, damping: float | None = None) -> None:
-        """Stop driving: an idle motor damps the arm."""
+    def brake(self, now_ns: int, damping: float, most: float = math.inf) -> None:
+        """Stop driving: from now on the motor damps the arm, with so much at most."""
         self.advance(now_ns)
         self._is_driven = False
-        if damping is not None:
-            self._damping = damping
+        self._damping, self._most = damping, most
 
     def advance(self, now_ns: int) -> None:
         """Let the arm move up to a time; it does not before it is first driven."""
@@ -219,6 +216,8 @@ class EmulatedAmplifier(ABC):
         self._n_events = 0
 
     # What is its own
+
+    _torn_bytes = 1  # of a frame that is cut short
 
     @abstractmethod
     def _is_addressed(self, frame: Frame) -> bool:
@@ -300,7 +299,7 @@ class EmulatedAmplifier(ABC):
         if self.faults.hit("dropped-replies", due_ns):
             return
         if self.faults.hit("short-replies", due_ns):
-            frame = frame._replace(data=frame.data[:-1])
+            frame = frame._replace(data=frame.data[: -self._torn_bytes])
         due_ns += round(self.faults.amount("late-replies", due_ns) * 1e9)
         # It answers requests in their order.
         self._last_reply_ns = due_ns = max(due_ns, self._last_reply_ns + 1)

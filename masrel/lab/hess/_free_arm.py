@@ -110,7 +110,9 @@ def _check_replies(took_s: list[float]) -> Check:
     )
 
 
-def check_rest(counts: list[int], angle: float, advice: str) -> tuple[Check, Check]:
+def check_rest(
+    counts: list[int], angle: float, advice: str, unit: str = "counts"
+) -> tuple[Check, Check]:
     """Return whether an arm is where an elbow can be, and at rest."""
     limits, n_moved = DeviceLimits(), max(counts) - min(counts)
     return (
@@ -122,7 +124,7 @@ def check_rest(counts: list[int], angle: float, advice: str) -> tuple[Check, Che
         Check(
             name="rest",
             holds=n_moved <= _REST_COUNTS,
-            result=f"{n_moved} counts in a second; at most {_REST_COUNTS} at rest",
+            result=f"{n_moved} {unit} in a second; at most {_REST_COUNTS} at rest",
         ),
     )
 
@@ -340,7 +342,7 @@ class _TurningArm:
         if self.angle < start:
             raise DeviceError(
                 "friction: needs an arm that a torque towards extension extends, it "
-                "flexes; torque and counts of the puck have different signs"
+                "flexes; torque and counts have different signs"
             )
 
     def turn(self, speed: float) -> list[tuple[float, float]]:

@@ -275,6 +275,7 @@ class DeviceSetup:
 # raises `DeviceError` when it does not fit; imported when it is chosen. Those of other
 # distributions are entry points of the group; none takes a name of these.
 _BACKENDS = {
+    "moteus": "masrel.lab.hess.moteus._moteus_device",
     "puck": "masrel.lab.hess.puck._puck_device",
     "replay": "masrel.lab.hess._replay",
     "simulated": "masrel.lab.hess._simulated",

@@ -74,12 +74,23 @@ class NodeReport:
     is_supported: bool
     properties: dict[str, int]
 
+    def __str__(self) -> str:
+        if self.firmware is None:
+            return f"puck {self.puck}: {self.kind}"
+        state = "awake" if self.is_awake else "asleep"
+        support = "" if self.is_supported else ", NOT SUPPORTED"
+        values = "".join(f", {name} {value}" for name, value in self.properties.items())
+        return (
+            f"puck {self.puck}: {self.kind}, firmware {self.firmware}, "
+            f"{state}{support}{values}"
+        )
+
 
 def probe(
     link: Link,
     clock: Clock,
+    options: PuckOptions | None = None,
     *,
-    properties: PropertyTable | None = None,
     progress: Callable[[], object] = lambda: None,
 ) -> tuple[NodeReport, ...]:
     """Ask every node who it is; nothing is set, and nobody is woken.
@@ -90,8 +101,8 @@ def probe(
         The bus, connected to all nodes.
     clock : Clock
         Its clock.
-    properties : PropertyTable or None, optional
-        Numbers of the properties, where a firmware is unknown to this driver.
+    options : PuckOptions or None, optional
+        For the numbers of properties, where a firmware is unknown to this driver.
     progress : callable, optional
         Called after each of the 31 nodes.
 
@@ -105,6 +116,7 @@ def probe(
     DeviceError
         If the bus fails.
     """
+    properties = None if options is None else options.properties
     reports = []
     for number in range(1, MAX_NODE + 1):
         report = _node_report(PuckNode(link, clock, number), properties)

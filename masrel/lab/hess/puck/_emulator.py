@@ -85,7 +85,7 @@ class PuckEmulator(EmulatedAmplifier):
             link=link,
             clock=clock,
             faults=options.faults,
-            motor=Motor(hand, range_end, options.braking),
+            motor=Motor(hand, range_end),
             counts_per_turn=options.counts_per_turn,
         )
         self._transmission = Transmission(
@@ -178,7 +178,7 @@ class PuckEmulator(EmulatedAmplifier):
         self.mode = mode
         if mode != TORQUE:
             self.torque = 0
-            self.motor.brake(now_ns)
+            self.motor.brake(now_ns, self._options.braking)
             return
         self._begin_faults(now_ns)
         self._turn(now_ns)
@@ -279,8 +279,5 @@ def connected(
             options=options.emulator or EmulatorOptions(),
             puck=options.puck,
         )
-    return options.open_link(
-        clock,
-        accepted=None if all_nodes else reply_identifiers(options.puck),
-        peer=emulator,
-    )
+    accepted = None if all_nodes else reply_identifiers(options.puck)
+    return options.open_link(clock, accepted=accepted, peer=emulator)

@@ -20,10 +20,9 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
-from masrel.lab.hess._can import Frame, Link, Node
-from masrel.lab.hess._clock import Clock, RealClock, SimulatedClock
+from masrel.lab.hess._can import Frame, Link, Node, check_angle, options_of
+from masrel.lab.hess._clock import Clock, RealClock
 from masrel.lab.hess.device import Device, DeviceSetup, IdleCommand, Reading
-from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.puck._bus import (
     MAX_TORQUE,
     decode_position,
@@ -69,8 +68,6 @@ _BLIND_AFTER_S = 0.05
 _POLL_TICKS = 5  # torques after which it is asked for its mode, or for its torque
 _MAX_UNANSWERED = 2  # polls in a row; one may get lost
 _MAX_LOST_TORQUES = 1  # in a row; the next comes after a tick
-
-_channels = itertools.count(1)
 
 
 class PuckNode(Node):
@@ -374,13 +371,7 @@ class PuckDevice(Device):
 
     def _check_angle(self) -> None:
         _, counts = self._node.position(self._puck.position_id, patience_s=0.05)
-        angle = self._puck.transmission.angle(counts)
-        limits = DeviceLimits()
-        if not limits.lowest_angle <= angle <= limits.highest_angle:
-            raise DeviceError(
-                f"puck {self._node.puck}: needs an arm between -5 and 185 deg, it "
-                f"reports {math.degrees(angle):.1f}; run masrel device zero"
-            )
+        check_angle(self._node.name, self._puck.transmission.angle(counts))
 
     def _read(self) -> Reading:
         puck, values = self._puck, self._node.values
@@ -474,22 +465,4 @@ class PuckDevice(Device):
 
 def build(setup: DeviceSetup) -> PuckDevice:
     """Make the device of a puck: emulated when there is a hand, else on a real bus."""
-    options, hand = setup.options, setup.hand
-    if options is None:
-        if hand is None:
-            raise DeviceError("puck: needs options that say on which bus it is")
-        # A bus that nobody else is on
-        channel = f"masrel-{next(_channels)}"
-        options = PuckOptions(interface="virtual", channel=channel)
-        options = options.emulated(hand.start)
-    if not isinstance(options, PuckOptions):
-        got = type(options).__name__
-        raise DeviceError(f"puck: needs options of type PuckOptions, got {got}")
-    if (hand is None) != (options.emulator is None):
-        raise DeviceError(
-            "puck: needs a simulated hand with an emulated puck and none without, got "
-            + ("an emulator alone" if hand is None else "a hand alone")
-        )
-    if hand is None and isinstance(setup.clock, SimulatedClock):
-        raise DeviceError("puck: needs a real clock, its bus is outside this process")
-    return PuckDevice(setup, options)
+    return PuckDevice(setup, options_of(setup, PuckOptions))

@@ -401,11 +401,7 @@ class PuckOptions(BusOptions):
             raise ParameterError(
                 f"angle_after_reset: needs 0 to 180 degrees, got {angle} rad"
             )
-        if self.emulator is not None and self.interface != "virtual":
-            raise ParameterError(
-                "interface: needs 'virtual' for an emulated puck, "
-                f"got {self.interface!r}"
-            )
+        BusOptions.__post_init__(self)
 
     def emulated(self, start: float) -> Self:
         """Return the same for an emulated puck of this gear, direction and firmware.

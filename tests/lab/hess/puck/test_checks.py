@@ -185,7 +185,7 @@ def test_a_motor_that_turns_the_other_way_is_noticed_at_once() -> None:
     # Under speed control it would run away.
     clock = SimulatedClock()
     with simulated(clock, send_fault=lambda _time_s, torque: -torque) as device:
-        words = "counts of the puck have different signs"
+        words = "torque and counts have different signs"
         with pytest.raises(DeviceError, match=words):
             steady_runs(device, clock)
         assert abs(device.read().angle - radians(60.0)) < radians(2.0)

@@ -1,0 +1,240 @@
+"""Bring a moteus up by hand: who is there, can it be driven, where is its arm.
+
+In: where it is, as `MoteusOptions`; nothing moves. Out: reports to print.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
+from masrel.lab.hess._can import Link
+from masrel.lab.hess._clock import Clock
+from masrel.lab.hess._free_arm import (
+    Check,
+    ask_often,
+    check_bus,
+    check_rest,
+    check_torque_mode,
+)
+from masrel.lab.hess.moteus._frames import INT8, INT32
+from masrel.lab.hess.moteus._moteus_device import ReadyServo
+from masrel.lab.hess.moteus._moteus_options import (
+    DRIVEN,
+    FAULTS,
+    FIRMWARE,
+    HOME_STATE,
+    SET_POSITION,
+    TIMEOUT,
+    MoteusOptions,
+)
+from masrel.lab.hess.moteus._servo import Servo
+
+N_NODES = 127
+_PROBE_PATIENCE_S = 0.01
+_TICK_S = 0.001
+_STEP = math.radians(0.005)  # of the angle of an arm at rest
+_MOST_TICKS = 50  # from a stop to the torque mode
+_TOLERANCE = math.radians(0.1)  # of an arm that is held while it is zeroed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoReport:
+    """What a moteus on the bus says of itself.
+
+    Attributes
+    ----------
+    servo : int
+        Its number.
+    firmware : str
+        Version.
+    home_state : int
+        2 where it knows where its output is.
+    volts, celsius : float
+        Of its supply, and of the board.
+    fault : str or None
+        What it has stopped itself for.
+    """
+
+    servo: int
+    firmware: str
+    home_state: int
+    volts: float
+    celsius: float
+    fault: str | None
+
+    def __str__(self) -> str:
+        known = "" if self.home_state == 2 else ", OUTPUT NOT KNOWN"
+        fault = "" if self.fault is None else f", FAULT {self.fault}"
+        return (
+            f"moteus {self.servo}: firmware {self.firmware}, {self.volts:g} V, "
+            f"{self.celsius:g} deg C{known}{fault}"
+        )
+
+
+def probe(
+    link: Link,
+    clock: Clock,
+    options: MoteusOptions,
+    *,
+    progress: Callable[[], object] = lambda: None,
+) -> tuple[ServoReport, ...]:
+    """Ask every number who it is; nothing is set.
+
+    Parameters
+    ----------
+    link : Link
+        The bus, connected to all nodes.
+    clock : Clock
+        Its clock.
+    options : MoteusOptions
+        Which bus.
+    progress : callable, optional
+        Called after each of the 127 numbers.
+
+    Returns
+    -------
+    tuple of ServoReport
+        Those that answer, in the order of their numbers.
+
+    Raises
+    ------
+    DeviceError
+        If the bus fails.
+    """
+    reports = []
+    for number in range(1, N_NODES + 1):
+        servo = Servo(link, clock, replace(options, servo=number))
+        try:
+            reports.append(_report(servo, number))
+        except DeviceTimeoutError:
+            pass
+        progress()
+    return tuple(reports)
+
+
+def _report(servo: Servo, number: int) -> ServoReport:
+    (version,) = servo.get(INT32, FIRMWARE, patience_s=_PROBE_PATIENCE_S)
+    home_state, volts, celsius, code = servo.get(INT8, HOME_STATE, 4)
+    major, minor, micro = int(version).to_bytes(4, "big")[1:]
+    return ServoReport(
+        servo=number,
+        firmware=f"{major}.{minor}.{micro}",
+        home_state=int(home_state),
+        volts=volts,
+        celsius=celsius,
+        fault=FAULTS.get(int(code)),
+    )
+
+
+def check(link: Link, clock: Clock, options: MoteusOptions) -> tuple[Check, ...]:
+    """See whether a moteus can be driven.
+
+    The arm must be at rest. The moteus is told no torque for some milliseconds, and
+    then nothing, so that its watchdog must let go; it is stopped afterwards.
+
+    Parameters
+    ----------
+    link : Link
+        The bus.
+    clock : Clock
+        Its clock.
+    options : MoteusOptions
+        Which moteus, and how its device is to behave.
+
+    Returns
+    -------
+    tuple of Check
+        What was checked.
+
+    Raises
+    ------
+    DeviceError
+        If the bus fails, or the moteus does not answer, does not know where its output
+        is, has other settings than a person's arm needs, or cannot be stopped.
+    """
+    ready = ReadyServo(link, clock, options)
+    servo, (low, high) = ready.servo, ready.bounds
+    settings = Check(
+        name="settings",
+        holds=True,
+        result=(
+            f"bounds {math.degrees(low):.1f} to {math.degrees(high):.1f} deg, "
+            f"servo.timeout_mode {ready.timeout_mode:g}: free after silence"
+        ),
+    )
+
+    def angle() -> float:
+        servo.ask()
+        return options.angle(servo.answer(_TICK_S).position)
+
+    answers, angles = ask_often(servo, angle)
+    steps = [round(angle / _STEP) for angle in angles]
+    advice = "look whether the arm is there"
+    rest = check_rest(steps, angles[-1], advice, "steps") if angles else ()
+    torque_mode = check_torque_mode(
+        lambda: _fall_silent(servo, options),
+        servo.stop,
+        f"in it, and out of it after {options.watchdog_ms:g} ms of silence; stopped "
+        "now, LOOK WHETHER THE ARM IS FREE",
+    )
+    return (settings, answers, *rest, torque_mode, check_bus(servo))
+
+
+def _fall_silent(servo: Servo, options: MoteusOptions) -> None:
+    for _ in range(_MOST_TICKS):
+        servo.command(0.0)
+        if servo.answer().mode == DRIVEN:
+            break
+        servo.wait(_TICK_S)
+    else:
+        raise DeviceError(f"{servo.name}: does not go into torque mode")
+    servo.wait(2e-3 * options.watchdog_ms)
+    servo.ask()
+    mode = servo.answer().mode
+    if mode != TIMEOUT:
+        raise DeviceError(
+            f"{servo.name}: needs mode {TIMEOUT} after silence, got {mode}"
+        )
+
+
+def zero(link: Link, clock: Clock, options: MoteusOptions, *, angle: float) -> float:
+    """Tell a moteus where the arm is; it forgets when its supply is switched off.
+
+    Parameters
+    ----------
+    link : Link
+        The bus.
+    clock : Clock
+        Its clock.
+    options : MoteusOptions
+        Which moteus, and how its device is to behave.
+    angle : float
+        Where the arm is held, rad; 0 at full flexion, to pi.
+
+    Returns
+    -------
+    float
+        The position that it reports afterwards, turns of its output.
+
+    Raises
+    ------
+    ParameterError
+        If no arm can be at `angle`.
+    DeviceError
+        If it does not answer, or does not take the position.
+    """
+    if not 0.0 <= angle <= math.pi:
+        raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
+    servo = Servo(link, clock, options)
+    servo.stop()  # its position is about to jump
+    servo.set(SET_POSITION, options.position(angle))
+    servo.wait(_TICK_S)
+    servo.ask()
+    position = servo.answer().position
+    if abs(options.angle(position) - angle) > _TOLERANCE:
+        raise DeviceError(
+            f"{servo.name}: needs a position of {options.position(angle):.5f} turns "
+            f"after zeroing, got {position:.5f}"
+        )
+    return position
