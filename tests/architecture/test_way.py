@@ -1,4 +1,4 @@
-"""The ways of a rating and of a presentation in docs/development/architecture.md."""
+"""The ways of a rating and of a presentation in docs/development/ways.md."""
 
 import re
 import sys
@@ -11,7 +11,7 @@ import masrel
 from tests.cli.process import Caller
 
 ROOT = Path(masrel.__file__).parent
-PAGE = (ROOT.parent / "docs/development/architecture.md").read_text("utf-8")
+PAGE = (ROOT.parent / "docs/development/ways.md").read_text("utf-8")
 STOP = re.compile(r"^\| \d+ \| `([\w/]+\.py)` \| `([\w.]+)` \|", re.MULTILINE)
 GRADES = ("1 1 2", "0 0 0", "2 2 2", "3 2 3", "1 1 1", "0 1 0") * 2
 
@@ -42,7 +42,7 @@ def passing() -> Iterator[dict[Stop, int]]:
 
 def told(what: str) -> list[Stop]:
     """Return the stops of the table below a heading."""
-    section = PAGE.partition(f"### The way of one {what}")[2].partition("\n###")[0]
+    section = PAGE.partition(f"## The way of one {what}")[2].partition("\n##")[0]
     return [(file, function) for file, function in STOP.findall(section)]
 
 
