@@ -95,6 +95,7 @@ copybutton_exclude = ".linenos, .gp, .go"
 _SHOWN = {
     "CONTRIBUTING.md": "development/contributing.md",
     "CHANGELOG.md": "development/changelog.md",
+    "SECURITY.md": "development/security.md",
     "studies/hess2012/README.md": "reference/hess2012.md",
 }
 # Pages whose folder has no index: the index that lists them
