@@ -92,6 +92,7 @@ from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coeff
 from masrel.agreement.repeated_limits import (
     LimitsWithMean,
     RepeatedLimits,
+    limits_by_clusters,
     limits_with_mean,
     limits_with_repeats,
 )
@@ -164,6 +165,7 @@ __all__ = [
     "kendall_w_test",
     "krippendorff_alpha",
     "light_kappa",
+    "limits_by_clusters",
     "limits_of_agreement",
     "limits_with_mean",
     "limits_with_repeats",

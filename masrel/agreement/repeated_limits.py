@@ -5,10 +5,10 @@ with their intervals, for single measurements.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import NormalDist
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -319,11 +319,7 @@ def _slope(averages: Floats, differences: Floats) -> tuple[float, float, str | N
 
 def _ended(limits: RepeatedLimits) -> RepeatedLimits:
     """Return the limits about the bias, and the ends of them all."""
-    bias, sd, parts = limits.bias, limits.sd, list(limits.parts)
-    ends, (between, df) = limits.low_interval, parts[0]
-    z, quantile = (
-        NormalDist().inv_cdf(0.5 + 0.5 * of) for of in (limits.share, ends.level)
-    )
+    ends, (between, df) = limits.low_interval, limits.parts[0]
     # the line turns about the mean of all, where other limits are told
     centre = limits.averages.sum() / max(limits.n_items, 1)
     sum_of_squares = max(float(((limits.averages - centre) ** 2).sum()), 1e-300)
@@ -331,18 +327,30 @@ def _ended(limits: RepeatedLimits) -> RepeatedLimits:
         1.0 / max(limits.n_items, 1) + (limits.average - centre) ** 2 / sum_of_squares
     )
     error = math.sqrt(between * lever)
-    low, high, why = _variance_ends(parts, sd**2, ends.level)
-    # MOVER: squared distances of the bias's ends and of z sd's add up; the bias's are
-    # normal ones here, with which the limits held their level from 4 items on
-    near = math.hypot(quantile * error, z * (sd - math.sqrt(low)))
-    far = math.hypot(quantile * error, z * (math.sqrt(high) - sd))
-    lower, upper = bias - z * sd, bias + z * sd
+    low, high, why = _variance_ends([*limits.parts], limits.sd**2, ends.level)
+    # the bias's ends are normal ones here, with which the limits held their level from
+    # 4 items on
+    half = NormalDist().inv_cdf(0.5 + 0.5 * ends.level) * error
     ends = replace(ends, reason=limits.reason or why)
+    return replace(
+        _about(limits, half, math.sqrt(low), math.sqrt(high), ends),
+        bias_interval=_around(ends, limits.bias, error, df, "", limits.reason),
+    )
+
+
+def _about(
+    limits: RepeatedLimits, half: float, low: float, high: float, ends: Interval
+) -> RepeatedLimits:
+    """Return limits about the bias ± half, with an SD between low and high."""
+    z = NormalDist().inv_cdf(0.5 + 0.5 * limits.share)
+    # MOVER: squared distances of the bias's ends and of z sd's add up
+    near = math.hypot(half, z * (limits.sd - low))
+    far = math.hypot(half, z * (high - limits.sd))
+    lower, upper = limits.bias - z * limits.sd, limits.bias + z * limits.sd
     return replace(
         limits,
         low=lower,
         high=upper,
-        bias_interval=_around(ends, bias, error, df, "", limits.reason),
         low_interval=replace(ends, low=lower - far, high=lower + near),
         high_interval=replace(ends, low=upper - near, high=upper + far),
     )
@@ -355,8 +363,7 @@ def _as_ratios(limits: RepeatedLimits) -> RepeatedLimits:
         for name in ("bias", "low", "high", "average")
     }
     for name in ("bias_interval", "low_interval", "high_interval"):
-        of = getattr(limits, name)
-        ratios[name] = replace(of, low=math.exp(of.low), high=math.exp(of.high))
+        ratios[name] = _exponential(getattr(limits, name))
     return replace(
         limits,
         **ratios,
@@ -541,3 +548,135 @@ def limits_with_mean(
         differences=(rated - centre)[~np.isnan(centre)],
         n_measurements=int(repeats[0].sum()),
     )
+
+
+_Limits = TypeVar("_Limits", RepeatedLimits, LimitsWithMean)
+_OF_MEAN = ("limit", "sem", "mdc")
+
+
+def limits_by_clusters(
+    data: Any,
+    measure: Callable[[Any], _Limits],
+    *,
+    clusters: str,
+    level: float = 0.95,
+) -> _Limits:
+    """Estimate limits of agreement whose intervals are for other clusters of items.
+
+    Parameters
+    ----------
+    data : DataFrame
+        Rows as `limits_with_repeats` or `limits_with_mean` takes them.
+    measure : callable
+        Takes rows like these and returns what either of the two returns, not of the
+        kind proportional.
+    clusters : str
+        Name of the column of clusters, such as patients of whom several joints were
+        measured. Items of one cluster may be alike; clusters are independent.
+    level : float, optional
+        Level of the intervals.
+
+    Returns
+    -------
+    RepeatedLimits or LimitsWithMean
+        What `measure` returns of all rows, with intervals for other clusters like
+        these, measured by the same methods or observers.
+
+    Raises
+    ------
+    RatingsError
+        If the column is not there, a row has no cluster, or there is one cluster only.
+    ParameterError
+        If the limits follow a line, or `level` is not within (0, 1).
+
+    Notes
+    -----
+    Clusters are left out one at a time. The bias, the slope and the logarithm of the
+    standard deviation have Student's t with one degree of freedom fewer than there are
+    clusters; limits combine the bias and the standard deviation as those of
+    `limits_with_repeats` do.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> rows = [(k, k // 2, 7 * k % 11, 7 * k % 11 + k // 2 % 3) for k in range(20)]
+    >>> frame = pd.DataFrame(rows, columns=["eye", "patient", "y", "x"])
+    >>> def measure(rows):
+    ...     return limits_with_repeats(rows, item="eye", first="x", second="y")
+    >>> ends = limits_by_clusters(frame, measure, clusters="patient").high_interval
+    >>> round(ends.low, 2), round(ends.high, 2)
+    (1.82, 3.41)
+    """
+    check_level(level)
+    check_frame(data, (clusters,), "data")
+    codes, names = levels(data[clusters], clusters)
+    needed = f"clusters: needs two or more to leave out, got {len(names)}"
+    refuse((len(names) < 2, needed), error=RatingsError)
+    # of all rows, and without each cluster
+    found: list[Any] = [measure(data[codes != k]) for k in range(-1, len(names))]
+    of_pairs = isinstance(found[0], RepeatedLimits)
+    if of_pairs:
+        pairs: _Limits = _of_pairs(found, level)
+        return pairs
+    logs = [[_log(getattr(of, name).value) for name in _OF_MEAN] for of in found]
+    ends = zip(_OF_MEAN, map(_exponential, _left_out(logs, level)), strict=True)
+    estimates: Any = {
+        name: replace(getattr(found[0], name), interval=of) for name, of in ends
+    }
+    result: _Limits = replace(found[0], **estimates)
+    return result
+
+
+def _of_pairs(found: list[Any], level: float) -> Any:
+    """Return limits of two methods, by those of all rows and without each cluster."""
+    limits: RepeatedLimits = found[0]
+    refuse((limits.kind == "proportional", "measure: needs limits that follow no line"))
+    is_ratio = limits.kind == "ratio"
+    rows = [
+        [_log(of.bias) if is_ratio else of.bias, _log(of.sd), of.slope] for of in found
+    ]
+    bias, of_log, slope = _left_out(rows, level)
+    sd = _exponential(of_log)
+    result = _about(
+        replace(limits, bias=rows[0][0], bias_interval=bias, slope_interval=slope),
+        *(0.5 * (bias.high - bias.low), sd.low, sd.high),
+        replace(bias, reason=bias.reason or sd.reason),
+    )
+    if not is_ratio:
+        return result
+    same = ("average", "averages", "differences")  # they are ratios already
+    return replace(_as_ratios(result), **{name: getattr(limits, name) for name in same})
+
+
+def _log(value: float) -> float:
+    return math.log(value) if value > 0.0 else math.nan
+
+
+def _exponential(ends: Interval) -> Interval:
+    return replace(ends, low=math.exp(ends.low), high=math.exp(ends.high))
+
+
+def _left_out(rows: list[list[float]], level: float) -> list[Interval]:
+    """Return intervals of numbers, from those of all rows and without each cluster."""
+    # of rows, each with the numbers of all and of one cluster less
+    from scipy.special import stdtrit  # loaded only for an interval
+
+    of_all, without = np.array(rows[0]), np.array(rows[1:])
+    n = len(without)
+    errors = np.sqrt((n - 1) * without.var(axis=0))  # (n - 1)/n Σ (θ_i - mean)²
+    halves = float(stdtrit(n - 1, 0.5 + 0.5 * level)) * errors
+    why = "with one of the clusters left out it is undefined"
+    return [
+        Interval(
+            low=low,
+            high=high,
+            level=level,
+            kind="confidence",
+            method=f"cluster jackknife, t({n - 1})",
+            target="items",
+            unit="clusters",
+            units_are="left out",
+            reason=why if math.isnan(low) else None,
+        )
+        for low, high in zip(of_all - halves, of_all + halves, strict=True)
+    ]

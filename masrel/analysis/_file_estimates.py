@@ -340,9 +340,11 @@ _EXPLANATIONS = {
     },
     "mover_ends": "{level} % CI: of the mean t, of the slope t with HC3 errors, of "
     "limits MOVER; for other items like these, measured by the same raters.",
+    "cluster_ends": "{level} % CI: leaving out one cluster at a time, with Student's "
+    "t; for other clusters like these, measured by the same raters.",
     "limits_with_mean": "Limit: 1.96 √((k − 1)/k) SEM on either side of the mean of "
-    "all k raters. MDC95: 1.96 √2 SEM. {level} % CI: modified large sample; for other "
-    "items and raters.",
+    "all k raters. MDC95: 1.96 √2 SEM.",
+    "mean_ends": "{level} % CI: modified large sample; for other items and raters.",
     "exact_ends": "{level} % CI: exact (t, noncentral t), each for itself; "
     "both: for the two limits together, factors of tolerance; for other items like "
     "these, rated by the same raters.",

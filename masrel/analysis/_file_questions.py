@@ -31,6 +31,7 @@ from masrel.agreement import (
     coefficient,
     contingency_table,
     kappa_max,
+    limits_by_clusters,
     limits_of_agreement,
     limits_with_mean,
     limits_with_repeats,
@@ -446,7 +447,7 @@ _QUANTITIES = {"mean": "Mean", "lower": "Lower limit", "upper": "Upper limit"}
 # What limits are of to the name of their answer, and of the notes on it
 _LIMITS = {
     "once": ("limits_of_agreement", "limits", "exact_ends"),
-    "mean": ("limits_with_mean", "limits_with_mean"),
+    "mean": ("limits_with_mean", "limits_with_mean", "mean_ends"),
     "difference": ("limits_with_repeats", "limits_with_repeats", "mover_ends"),
     "proportional": ("limits_that_follow", "limits_that_follow", "mover_ends"),
     "ratio": ("limits_of_ratios", "limits_of_ratios", "mover_ends"),
@@ -456,12 +457,24 @@ _LIMITS = {
 def _limits(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     """Give between which bounds the measurements of raters differ."""
     check_order(file, file.read["file"])
+    is_clustered = file.read.get("clusters") is not None
+    refuse(
+        (
+            is_clustered and questions.kind == "proportional",
+            "--clusters: limits on a line take every item by itself, so needs one of "
+            "--clusters and --kind proportional, got both",
+        )
+    )
     panels: list[tuple[Sequence[str], Any]] = []
     truth, has_more = questions.truth, any(len(of.raters) > 2 for of in file.parts)
     of_what: str = questions.kind or ("once" if truth is None else "difference")
     if questions.kind is None and truth != "varying" and has_more:
         of_what = "mean"
+    if of_what == "once" and is_clustered:
+        of_what = "difference"  # the same limits, whose intervals can be others
     name, *texts = _LIMITS[of_what]
+    if is_clustered:
+        texts[1:] = ["cluster_ends"]
     rows_of = _of_pairs if of_what == "once" else partial(_of_more, of_what)
     answer = _table(name, file, partial(rows_of, questions, panels))
     pairs = (
@@ -510,7 +523,8 @@ def _of_pairs(
     yield row, *cells
 
 
-_ITEM = " item"  # which no rater is called: names have no blanks around
+# which no rater is called: names have no blanks around
+_ITEM, _CLUSTER = " item", " cluster"
 
 
 def _of_more(
@@ -522,30 +536,23 @@ def _of_more(
     values, columns = rating_values(coded, None), list(part.raters)
     frame = pd.DataFrame(values, columns=columns)  # a row a time
     frame[_ITEM] = part.items or range(len(values))
-    if of_what == "mean":
-        result: Any = limits_with_mean(
-            frame, item=_ITEM, observers=columns, level=questions.level
+    measure = _measure(of_what, questions, columns)
+    if part.clusters:
+        frame[_CLUSTER] = part.clusters
+        result = limits_by_clusters(
+            frame, measure, clusters=_CLUSTER, level=questions.level
         )
+    else:
+        result = measure(frame)
+    panels.append((part.raters, result))
+    if of_what == "mean":
         of_all = {"Limit, ±": result.limit, "SEM": result.sem, "MDC95": result.mdc}
         shown = [(title, of.value, of.interval) for title, of in of_all.items()]
-        row: Row = {
-            "raters": part.raters,
-            "n_items": result.sem.n_items,
-            "reason": result.sem.reason,
-        }
+        of_sem = {key: getattr(result.sem, key) for key in ("n_items", "reason")}
+        row: Row = {"raters": part.raters, **of_sem}
     else:
-        result = limits_with_repeats(
-            frame,
-            item=_ITEM,
-            first=columns[0],
-            second=columns[1],
-            truth=questions.truth or "constant",
-            kind=questions.kind or "difference",
-            level=questions.level,
-        )
         shown = _of_line(result)
         row = dict(zip(("first", "second"), part.raters, strict=True))
-    panels.append((part.raters, result))
     cells = [
         {"title": title, "quantity": title, "value": value}
         # the limits, beside low and high ends of each
@@ -559,6 +566,25 @@ def _of_more(
         for title, value, of in shown
     ]
     yield {**row, **as_document(result)}, *cells
+
+
+def _measure(
+    of_what: str, questions: Questions, columns: list[str]
+) -> Callable[[Any], Any]:
+    """Return what computes limits of rows of measurements."""
+    if of_what == "mean":
+        return partial(
+            limits_with_mean, item=_ITEM, observers=columns, level=questions.level
+        )
+    return partial(
+        limits_with_repeats,
+        item=_ITEM,
+        first=columns[0],
+        second=columns[1],
+        truth=questions.truth or "constant",
+        kind=questions.kind or "difference",
+        level=questions.level,
+    )
 
 
 def _of_line(limits: RepeatedLimits) -> list[tuple[str, float, Interval]]:

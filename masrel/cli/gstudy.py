@@ -62,6 +62,14 @@ _LEVELS = ((1, 2, 3, 4, 6, 8), (1, 2, 4), (1, 2))
 )
 @click.option("--aim", type=float, help="Seek the cheapest design that has this Φ.")
 @click.option(
+    "--persons",
+    type=whole_numbers,
+    metavar="N,…",
+    help="How many a study to come has: the interval that the designs of --for and the "
+    "cheapest can expect, and the chance that it lies above --aim, by 200 simulated "
+    "studies.",
+)
+@click.option(
     "--seek",
     type=click.Choice(["dependability", "generalizability"]),
     default="dependability",
@@ -100,6 +108,7 @@ def gstudy(
     cut: float | None,
     sizes: tuple[list[int], ...],
     aim: float | None,
+    persons: list[int] | None,
     seek: Literal["dependability", "generalizability"],
     prices: list[float] | None,
     reading: Reading,
@@ -119,6 +128,10 @@ def gstudy(
             f"--for: needs one number for each of {listed(facets)}, got {[*sizes]}",
         ),
         (prices and aim is None, "--cost: needs --aim, for which a design is sought"),
+        (
+            persons and aim is None and not sizes,
+            "--persons: needs the designs that they are for, by --for or --aim",
+        ),
     )
     # imported here: they load slowly, and a call that is refused needs none of them
     from pandas import DataFrame
@@ -126,6 +139,7 @@ def gstudy(
     from masrel.agreement import cheapest_design, d_study, g_study
     from masrel.analysis._file_estimates import placed
     from masrel.pages._answer_page import study_page
+    from masrel.planning import design_precision
     from masrel.ratings._reader import read_facets
     from masrel.tables._decision_tables import (
         study_curves,
@@ -159,7 +173,15 @@ def gstudy(
         if aim is not None:
             designs.append(cheapest_design(study, aim, prices=prices, of=seek))
         data = "simulated" if sheet.is_simulated else "foreign"
-        shown, document = study_tables(study, designs, file=sheet.name, data=data)
+        seed = of_intervals["rng"]
+        plans = [
+            design_precision(study, of.sizes, n_persons=n, aim=aim, of=seek, rng=seed)
+            for of in designs
+            for n in persons or ()
+            if sizes or of.cost is not None  # of those that somebody asked for
+        ]
+        name = sheet.name
+        shown, document = study_tables(study, designs, plans, file=name, data=data)
         curves = study_curves(study, aim)
     inputs = {"Command": call_text(), f"SHA-256 of {file.name}": sheet.sha256()}
     write_output(

@@ -3,7 +3,7 @@
 import click
 
 from masrel.analysis._file_estimates import OF_MEASUREMENTS
-from masrel.cli._file_answers import by_option, file_command
+from masrel.cli._file_answers import by_option, clusters_option, file_command
 
 limits = file_command(
     "limits",
@@ -15,6 +15,7 @@ limits = file_command(
     rater measured more than once need --truth.
     """,
     by_option,
+    clusters_option,
     estimating=("level",),
     questions=[
         click.option(

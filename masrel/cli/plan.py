@@ -29,6 +29,7 @@ _NOT_OF_STUDIES = (  # what a protocol says
     *("coefficient", "weights", "n_items", "n_raters", "categories", "target"),
     *("pilot", "power", "assurance", "max_cost", "prices", "executor", "scheduler"),
 )
+_OF_UNITS = {"error", "n_items", "half_width", "level"}
 
 
 def _prevalences(text: str) -> list[Any]:
@@ -123,6 +124,12 @@ _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
     help="How many are simulated.  [default: as many as the error needs]",
 )
 @click.option(
+    "--error",
+    type=float,
+    help="Standard error of any estimate in a study of --items: how many items, "
+    "documents or clusters make its interval ± --half-width.",
+)
+@click.option(
     "--executor",
     type=click.Choice(["dask"]),
     help="Who plans a grid, in place of this process.",
@@ -146,6 +153,9 @@ def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) 
     at its size. masrel plan --judge --help: items for a judge, such as a model.
     """
     arguments = {key: value for key, value in options.items() if value is not None}
+    if "error" in arguments:
+        _plan_units(arguments, output)
+        return
     labels, plans = _plans(study, {"rng": 0, **arguments}, is_quiet=output.quiet)
     sizes = ({one.n_items for one in plans}, {one.n_raters for one in plans})
     refuse(
@@ -176,6 +186,26 @@ def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) 
             else tables.planning_table(plans, labels=labels)
         ),
         figure=lambda: tables.planning_curves(plans, arguments),
+    )
+
+
+def _plan_units(arguments: dict[str, Any], output: OutputOptions) -> None:
+    """Say how many units make the interval of an estimate narrow enough."""
+    absent = {"n_items", "half_width"} - arguments.keys()
+    refuse((absent, "--error: needs --items that it is of, and --half-width"))
+    _refuse(arguments, arguments.keys() - _OF_UNITS, "is not of a plan by --error")
+    from masrel.planning import units_needed
+
+    (n_items, *_), half = arguments["n_items"], arguments["half_width"]
+    level = arguments.get("level", 0.95)
+    n = units_needed(arguments["error"], n_items, half_width=half, level=level)
+    write_output(
+        output,
+        document=lambda: {**arguments, "level": level, "n_needed": n},
+        text=lambda: (
+            f"{n} are needed where {n_items} give an error of {arguments['error']:g}, "
+            f"for an interval that is expected to be ± {half:g}."
+        ),
     )
 
 

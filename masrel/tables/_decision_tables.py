@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from masrel.agreement.decision import DStudy, d_study, single_ratings
 from masrel.agreement.generalizability import GStudy
@@ -20,6 +20,9 @@ from masrel.tables._tables import (
     percent,
     table_of,
 )
+
+if TYPE_CHECKING:
+    from masrel.planning import PlannedDesign
 
 Row = dict[str, Any]
 
@@ -74,6 +77,7 @@ _CAPTIONS = {
     "components": "",
     "d_study": "Reliability of means over so many levels",
     "single_ratings": "Reliability of single ratings: Φ is ICC, absolute agreement",
+    "planned": "Intervals that studies to come can expect",
 }
 
 
@@ -108,11 +112,23 @@ def _columns(study: GStudy) -> dict[str, list[Column]]:
             Column(key="shared", heading="Ratings with", align="left"),
             *reliability,
         ],
+        "planned": [
+            Column(key="n_persons", heading=study.of),
+            *(Column(key=name, heading=name) for name in study.facets),
+            *_interval_columns(""),
+            Column(key="chance", heading="Chance", digits=3),
+            Column(key="monte_carlo_error", heading="± MC", digits=3),
+        ],
     }
 
 
 def study_tables(
-    study: GStudy, designs: Sequence[DStudy], *, file: str, data: str
+    study: GStudy,
+    designs: Sequence[DStudy],
+    plans: "Sequence[PlannedDesign]",
+    *,
+    file: str,
+    data: str,
 ) -> tuple[list[Table], dict[str, object]]:
     """Return components, designs and single ratings as tables, and for JSON."""
     rows: dict[str, list[Row]] = {
@@ -123,6 +139,8 @@ def study_tables(
             for shared, design in single_ratings(study).items()
         ],
     }
+    if plans:
+        rows["planned"] = [{**asdict(plan), **plan.sizes} for plan in plans]
     read = (
         f"Read {Path(file).name}: {counted(study.n_ratings, 'rating')} with mean "
         f"{number(study.mean, 3, in_units=True)}; levels: {_levels(study)}; "
@@ -132,6 +150,7 @@ def study_tables(
     first, *more = (
         table_of(name, _CAPTIONS[name], of, rows[name], hide_empty=True, data=data)
         for name, of in _columns(study).items()
+        if name in rows
     )
     document: Row = {
         name: [
