@@ -46,8 +46,10 @@ from masrel.agreement.change import (
 )
 from masrel.agreement.decision import (
     DStudy,
+    PlannedDesign,
     cheapest_design,
     d_study,
+    design_precision,
     single_ratings,
 )
 from masrel.agreement.generalizability import GStudy, g_study
@@ -122,6 +124,7 @@ __all__ = [
     "LimitsWithMean",
     "McnemarKind",
     "Metric",
+    "PlannedDesign",
     "Property",
     "RepeatedLimits",
     "Significance",
@@ -151,6 +154,7 @@ __all__ = [
     "count_table",
     "d_study",
     "declared_weights",
+    "design_precision",
     "equivalence_p_value",
     "fleiss_kappa",
     "fleiss_null",

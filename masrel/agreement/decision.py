@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from masrel._input import check_option, listed, refuse, shown, warn_caller
-from masrel.agreement._engine import check_level
+from masrel.agreement._effects import pivotal_draws
+from masrel.agreement._engine import Floats, check_level
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval
 
@@ -290,6 +291,132 @@ def cheapest_design(
     chosen = enough[np.lexsort((-reached[enough], costs[enough]))[0]]
     design = d_study(study, {name: int(n[chosen]) for name, n in sizes.items()})
     return replace(design, cost=float(costs[chosen]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedDesign:
+    """What a generalizability study of a design is expected to show.
+
+    Attributes
+    ----------
+    n_persons : int
+        How many are measured.
+    sizes : mapping of str to int
+        Levels of each facet; of a nested one within each level of the facet above.
+    low, high : float
+        Mean ends of the interval of the coefficient.
+    chance : float or None
+        Of a low end that reaches the aim, where there is one.
+    monte_carlo_error : float
+        Standard error of the chance, or of the mean low end.
+    """
+
+    n_persons: int
+    sizes: Mapping[str, int]
+    low: float
+    high: float
+    chance: float | None
+    monte_carlo_error: float
+
+
+def design_precision(
+    study: "GStudy",
+    sizes: Mapping[str, int],
+    *,
+    n_persons: int,
+    aim: float | None = None,
+    of: Literal["dependability", "generalizability"] = "dependability",
+    n_studies: int = 200,
+    rng: int = 0,
+) -> PlannedDesign:
+    """Simulate g studies of a design, with the components of one that is known.
+
+    Parameters
+    ----------
+    study : GStudy
+        Components that are taken to be true, such as those of a pilot.
+    sizes : mapping of str to int
+        Levels of each facet in the mean that is judged; of a nested one within each
+        level of the facet above. The study to come has as many, but two at least.
+    n_persons : int
+        How many are measured, each at every level.
+    aim : float, optional
+        What the interval's low end should reach.
+    of : {"dependability", "generalizability"}, optional
+        Which coefficient: Φ, or Eρ².
+    n_studies : int, optional
+        How many are simulated.
+    rng : int, optional
+        Seed.
+
+    Returns
+    -------
+    PlannedDesign
+        The interval that can be expected, and the chance to reach the aim.
+
+    Raises
+    ------
+    ParameterError
+        If a facet is missing or unknown, a number is too small, or the aim is not
+        within (0, 1).
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from masrel.agreement import design_precision, g_study
+    >>> frame = pd.DataFrame({"person": [1, 1, 2, 2, 3, 3], "rater": list("ABABAB"),
+    ...                       "grade": [4, 5, 2, 1, 2, 4]})
+    >>> pilot = g_study(frame, of="person", facets=["rater"])
+    >>> for n in (20, 80):
+    ...     plan = design_precision(pilot, {"rater": 4}, n_persons=n, aim=0.7)
+    ...     print(n, round(plan.low, 2), plan.chance)
+    20 0.65 0.42
+    80 0.78 0.975
+    """
+    check_option("of", of, ("dependability", "generalizability"))
+    check_level(0.5 if aim is None else aim, "aim")
+    refuse((n_persons < 2, f"n_persons: needs two or more, got {n_persons!r}"))
+    study.d_study(**sizes)  # which checks them
+    # of one level alone nobody can tell the variance
+    levels = {study.of: n_persons, **{of: max(n, 2) for of, n in sizes.items()}}
+    effects = {of: at for of, at in study.effects.items() if at <= {*levels}}
+    # with one rating a cell the residual is in the last effect
+    parts = np.maximum([*study.components.values()], 0.0)
+    parts = np.append(parts[: len(effects) - 1], parts[len(effects) - 1 :].sum())
+    expected, df = _balanced(effects, levels)
+    generator = np.random.default_rng(rng)
+    ends = np.empty((n_studies, 2))
+    for k in range(n_studies):
+        squares = expected @ parts * generator.chisquare(df) / df
+        solved = np.linalg.solve(expected, squares)
+        one = replace(
+            study,
+            effects=effects,
+            components=dict(zip(effects, solved, strict=True)),
+            draws=pivotal_draws(squares, df, expected, generator),
+        )
+        interval = getattr(one.d_study(**sizes), f"{of}_interval")
+        ends[k] = interval.low, interval.high
+    reached = ends[:, 0] if aim is None else ends[:, 0] >= aim
+    return PlannedDesign(
+        n_persons=n_persons,
+        sizes=dict(sizes),
+        low=float(ends[:, 0].mean()),
+        high=float(ends[:, 1].mean()),
+        chance=None if aim is None else float(reached.mean()),
+        monte_carlo_error=float(reached.std() / math.sqrt(n_studies)),
+    )
+
+
+def _balanced(
+    effects: Mapping[str, frozenset[str]], levels: Mapping[str, int]
+) -> tuple[Floats, Floats]:
+    """Return mean squares expected of each variance, and degrees of freedom."""
+    columns, n_ratings = [*effects.values()], math.prod(levels.values())
+    n = np.array([math.prod(levels[name] for name in of) for of in columns])
+    lies_within = np.array([[one <= other for other in columns] for one in columns])
+    # an effect and those that it lies within have n - 1 degrees of freedom together
+    return lies_within * n_ratings / n, np.linalg.solve(lies_within.T, n - 1.0)
 
 
 def single_ratings(study: "GStudy") -> dict[str, DStudy]:

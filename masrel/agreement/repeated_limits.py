@@ -613,27 +613,28 @@ def limits_by_clusters(
     needed = f"clusters: needs two or more to leave out, got {len(names)}"
     refuse((len(names) < 2, needed), error=RatingsError)
     # of all rows, and without each cluster
-    found: list[Any] = [measure(data[codes != k]) for k in range(-1, len(names))]
-    of_pairs = isinstance(found[0], RepeatedLimits)
+    results: list[Any] = [measure(data[codes != k]) for k in range(-1, len(names))]
+    of_pairs = isinstance(results[0], RepeatedLimits)
     if of_pairs:
-        pairs: _Limits = _of_pairs(found, level)
+        pairs: _Limits = _of_pairs(results, level)
         return pairs
-    logs = [[_log(getattr(of, name).value) for name in _OF_MEAN] for of in found]
+    logs = [[_log(getattr(of, name).value) for name in _OF_MEAN] for of in results]
     ends = zip(_OF_MEAN, map(_exponential, _left_out(logs, level)), strict=True)
     estimates: Any = {
-        name: replace(getattr(found[0], name), interval=of) for name, of in ends
+        name: replace(getattr(results[0], name), interval=of) for name, of in ends
     }
-    result: _Limits = replace(found[0], **estimates)
+    result: _Limits = replace(results[0], **estimates)
     return result
 
 
-def _of_pairs(found: list[Any], level: float) -> Any:
+def _of_pairs(results: list[Any], level: float) -> Any:
     """Return limits of two methods, by those of all rows and without each cluster."""
-    limits: RepeatedLimits = found[0]
+    limits: RepeatedLimits = results[0]
     refuse((limits.kind == "proportional", "measure: needs limits that follow no line"))
     is_ratio = limits.kind == "ratio"
     rows = [
-        [_log(of.bias) if is_ratio else of.bias, _log(of.sd), of.slope] for of in found
+        [_log(of.bias) if is_ratio else of.bias, _log(of.sd), of.slope]
+        for of in results
     ]
     bias, of_log, slope = _left_out(rows, level)
     sd = _exponential(of_log)

@@ -36,12 +36,12 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
             for judge in judges
         )
     )
-    found = [
+    answers = [
         _of_judge(file, judge, verdicts[judge], tie, questions.level)
         for judge in judges or list(verdicts)
     ]
-    biases = [bias for bias, _ in found]
-    strengths = [row for _, rows in found for row in rows]
+    biases = [bias for bias, _ in answers]
+    strengths = [row for _, rows in answers for row in rows]
     for name, kind, rows in (
         ("preferences", "position", biases),
         ("strengths", "strengths", strengths),

@@ -136,10 +136,9 @@ def gstudy(
     # imported here: they load slowly, and a call that is refused needs none of them
     from pandas import DataFrame
 
-    from masrel.agreement import cheapest_design, d_study, g_study
+    from masrel.agreement import cheapest_design, d_study, design_precision, g_study
     from masrel.analysis._file_estimates import placed
     from masrel.pages._answer_page import study_page
-    from masrel.planning import design_precision
     from masrel.ratings._reader import read_facets
     from masrel.tables._decision_tables import (
         study_curves,

@@ -203,8 +203,8 @@ def _plan_units(arguments: dict[str, Any], output: OutputOptions) -> None:
         output,
         document=lambda: {**arguments, "level": level, "n_needed": n},
         text=lambda: (
-            f"{n} are needed where {n_items} give an error of {arguments['error']:g}, "
-            f"for an interval that is expected to be ± {half:g}."
+            f"{n} are needed for an interval that is expected to be ± {half:g}, where "
+            f"{n_items} give a standard error of {arguments['error']:g}."
         ),
     )
 

@@ -5,11 +5,7 @@ was sampled, and an aim. Out: a `Plan`, exact where all studies can be summed ov
 simulated with its Monte Carlo error.
 """
 
-from masrel.planning._measurements import (
-    PlannedDesign,
-    design_precision,
-    units_needed,
-)
+from masrel.planning._formulas import units_needed
 from masrel.planning._sizes import plan_grid, precision, sample_size
 from masrel.planning._study_plan import LatentModel, Pilot, Plan, Study, pilot
 
@@ -17,9 +13,7 @@ __all__ = [
     "LatentModel",
     "Pilot",
     "Plan",
-    "PlannedDesign",
     "Study",
-    "design_precision",
     "pilot",
     "plan_grid",
     "precision",

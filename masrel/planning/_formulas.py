@@ -27,6 +27,7 @@ from statistics import NormalDist
 import numpy as np
 
 from masrel._input import refuse
+from masrel.agreement._engine import check_level
 from masrel.planning._studies import all_studies, icc_ratio
 from masrel.planning._study_plan import FORMULAS, chance_of
 from masrel.planning._truth import (
@@ -244,3 +245,64 @@ def check_has_numbers(design: Design) -> None:
             f"raters and two categories, got {study.n_raters} and {q}",
         ),
     )
+
+
+def units_needed(
+    standard_error: float, n_units: int, *, half_width: float, level: float = 0.95
+) -> int:
+    """Return how many items, documents or clusters make an interval narrow enough.
+
+    Parameters
+    ----------
+    standard_error : float
+        That of any estimate, in a study of `n_units` of them: of a pilot, or by a
+        formula.
+    n_units : int
+        How many that study has.
+    half_width : float
+        What half of the interval may be, in the units of the estimate.
+    level : float, optional
+        Level of the interval.
+
+    Returns
+    -------
+    int
+        The least n for which t(n − 1) · `standard_error` · √(`n_units`/n) is no larger.
+
+    Raises
+    ------
+    ParameterError
+        If the error or the half is not above 0, there are fewer than two units, or the
+        level is not within (0, 1).
+
+    References
+    ----------
+    .. [1] Bland, J. M., Altman, D. G. (1999). Measuring agreement in method comparison
+       studies. Statistical Methods in Medical Research, 8(2), 135-160.
+       https://doi.org/10.1177/096228029900800204
+
+    Examples
+    --------
+    A limit of agreement of n items has the error s √(1/n + 1.96²/(2 (n − 1))) [1]_;
+    with s = 3, for limits ± 1:
+
+    >>> import math
+    >>> units_needed(3.0 * math.sqrt(1 / 20 + 1.96**2 / 38), 20, half_width=1.0)
+    107
+    """
+    from scipy.special import ndtri, stdtrit  # loaded only here
+
+    check_level(level)
+    refuse(
+        (
+            not 0.0 < standard_error < math.inf or not half_width > 0.0,
+            "standard_error, half_width: need numbers above 0, got "
+            f"{standard_error!r} and {half_width!r}",
+        ),
+        (n_units < 2, f"n_units: needs two or more, got {n_units!r}"),
+    )
+    of_one, upper = standard_error**2 * n_units / half_width**2, 0.5 + 0.5 * level
+    n = max(2, math.ceil(of_one * float(ndtri(upper)) ** 2))  # by the normal: too few
+    while of_one * float(stdtrit(n - 1, upper)) ** 2 > n:
+        n += 1
+    return n

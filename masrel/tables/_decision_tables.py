@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from masrel.agreement.decision import DStudy, d_study, single_ratings
+from masrel.agreement.decision import DStudy, PlannedDesign, d_study, single_ratings
 from masrel.agreement.generalizability import GStudy
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import (
@@ -20,9 +20,6 @@ from masrel.tables._tables import (
     percent,
     table_of,
 )
-
-if TYPE_CHECKING:
-    from masrel.planning import PlannedDesign
 
 Row = dict[str, Any]
 
@@ -125,7 +122,7 @@ def _columns(study: GStudy) -> dict[str, list[Column]]:
 def study_tables(
     study: GStudy,
     designs: Sequence[DStudy],
-    plans: "Sequence[PlannedDesign]",
+    plans: Sequence[PlannedDesign],
     *,
     file: str,
     data: str,

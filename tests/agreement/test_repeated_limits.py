@@ -3,6 +3,8 @@
 import csv
 import json
 import math
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +18,14 @@ from docs.make.limits import BEGIN, END, PAGE, ROWS, rows, section
 from masrel.agreement import (
     LimitsWithMean,
     RepeatedLimits,
+    limits_by_clusters,
     limits_of_agreement,
     limits_with_mean,
     limits_with_repeats,
     mdc,
     sem,
 )
-from masrel.errors import UndefinedStatisticWarning
+from masrel.errors import MasrelError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 
 FILE = Path(__file__).parents[1] / "oracles" / "repeated_limits.json"
@@ -231,6 +234,79 @@ def test_gaps_of_observers_and_single_ones() -> None:
         assert math.isnan(with_mean(gaps[:, :1]).limit.value)
 
 
+# ---- clusters ----
+
+
+def test_items_that_are_clusters_have_the_usual_interval_of_the_bias(
+    once: pd.DataFrame,
+) -> None:
+    usual = limits(once)
+    found = limits_by_clusters(once.assign(own=once["item"]), limits, clusters="own")
+    assert (found.bias, found.low, found.high) == (usual.bias, usual.low, usual.high)
+    assert ends(found.bias_interval) == pytest.approx(ends(usual.bias_interval))
+
+
+@pytest.mark.parametrize("kind", ["difference", "ratio"])
+def test_clusters_are_left_out_by_hand(once: pd.DataFrame, kind: Any) -> None:
+    # of differences, or of logarithms: mean and log SD without every cluster of three
+    frame = once.assign(site=np.arange(30) % 10)
+    found = limits_by_clusters(
+        frame, partial(limits, kind=kind), clusters="site", level=0.9
+    )
+    pairs = frame[["x", "y"]].to_numpy()
+    x, y = (np.log(pairs) if kind == "ratio" else pairs).T
+    d, site = x - y, frame["site"].to_numpy()
+    left = [d[site != k] for k in range(10)]
+    numbers = [[np.mean(of) for of in left], [np.log(np.std(of)) for of in left]]
+    # √(n - 1) times the SD over the ten, times t
+    half, of_log = stats.t.ppf(0.95, 9) * 3.0 * np.std(numbers, axis=1)
+    sd = np.std(d, ddof=1)
+    up, down = sd * math.exp(of_log) - sd, sd - sd * math.exp(-of_log)
+    z = stats.norm.ppf(0.975)
+    high = d.mean() + z * sd
+    expected = [
+        d.mean() - half,
+        d.mean() + half,
+        high - math.hypot(half, z * down),
+        high + math.hypot(half, z * up),
+    ]
+    shown = np.exp(expected) if kind == "ratio" else expected
+    assert [*ends(found.bias_interval), *ends(found.high_interval)] == pytest.approx(
+        shown, rel=1e-9
+    )
+    assert found.low_interval.unit == "clusters"
+
+
+def test_limits_with_the_mean_follow_their_error(rng: np.random.Generator) -> None:
+    table = pd.DataFrame(rng.normal(size=(24, 3)), columns=["a", "b", "c"])
+    table = table.assign(item=range(24), site=np.arange(24) // 2)
+    measure = partial(limits_with_mean, item="item", observers=["a", "b", "c"])
+    found, usual = limits_by_clusters(table, measure, clusters="site"), measure(table)
+    ratios = [
+        np.array(ends(of.interval)) / of.value
+        for of in (found.limit, found.sem, found.mdc)
+    ]
+    assert ratios[0] == pytest.approx(ratios[1])
+    assert ratios[0] == pytest.approx(ratios[2])
+    assert ratios[0].prod() == pytest.approx(1.0)  # alike on the logarithm
+    assert found.sem.value == usual.sem.value
+
+
+def test_what_no_cluster_tells_has_its_reason() -> None:
+    frame = pd.DataFrame({"item": range(6), "x": 1.0, "y": 0.0, "site": [0, 1] * 3})
+    found = limits_by_clusters(frame, limits, clusters="site")
+    assert (found.low, found.high) == (1.0, 1.0)
+    assert "left out" in str(found.low_interval.reason)
+    for wrong, options, name in (
+        (frame.assign(site=1), {}, "two or more"),
+        (frame.assign(site=None), {}, "site"),
+        (frame, {"kind": "proportional"}, "line"),
+    ):
+        with pytest.warns(UndefinedStatisticWarning) if options else nullcontext():
+            with pytest.raises(MasrelError, match=name):
+                limits_by_clusters(wrong, partial(limits, **options), clusters="site")
+
+
 # ---- coverage ----
 
 
@@ -240,7 +316,7 @@ def test_the_page_is_made_from_its_rows() -> None:
 
 
 def test_intervals_hold_93_in_100_in_every_cell() -> None:
-    assert len(FOUND) == 136
+    assert len(FOUND) == 152
     for row in FOUND:
         assert int(row["n_held"]) >= 0.93 * int(row["n_studies"]), row
 

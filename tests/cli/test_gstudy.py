@@ -111,3 +111,32 @@ def test_grades_of_text_need_their_order(masrel: Caller, tmp_path: Path) -> None
     assert "--categories" in refused.err
     done = masrel("gstudy", file, "--facets", "rater", "--categories", "low,mid,high")
     assert done.code == 0, done.err
+
+
+def test_teeth_are_measured_in_patients(masrel: Caller, tmp_path: Path) -> None:
+    rng, path = np.random.default_rng(8), tmp_path / "teeth.csv"
+    level = rng.normal(size=(9, 1, 1)) + rng.normal(size=(9, 2, 1))
+    grades = level + 0.5 * rng.normal(size=(9, 2, 3))
+    rows = [f"{p},{p}{t},{r},{x}" for (p, t, r), x in np.ndenumerate(grades)]
+    path.write_text("\n".join(["patient,tooth,rater,grade", *rows]), encoding="utf-8")
+    in_patients = ("--facets", "tooth,rater", "--nested", "tooth:patient")
+    call = ("gstudy", path, *in_patients, "--fixed", "tooth", "--for", "1,1")
+    done = masrel(*call, "--persons", "30,60", "--json", "-")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    parts = {row["source"]: row["variance"] for row in document["components"]}
+    (design,) = document["d_study"]
+    # what is measured is a tooth of a patient
+    universe = sum(max(parts[of], 0.0) for of in ("patient", "tooth:patient"))
+    assert design["universe"] == pytest.approx(universe)
+    assert design["absolute_error"] == pytest.approx(
+        sum(max(part, 0.0) for of, part in parts.items() if "rater" in of)
+    )
+    plans = document["planned"]
+    assert [(of["n_persons"], of["tooth"], of["rater"]) for of in plans] == [
+        (30, 1, 1),
+        (60, 1, 1),
+    ]
+    assert plans[0]["low"] < plans[1]["low"] < design["dependability"]
+    shown = masrel(*call, "--persons", "30", "--aim", "0.6").out
+    assert "Intervals that studies to come can expect" in shown

@@ -1,6 +1,7 @@
 """masrel limits: repeats, lines, ratios and several observers of any file."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,11 @@ import pandas as pd
 import pytest
 
 from masrel import agree
-from masrel.agreement import limits_with_mean, limits_with_repeats
+from masrel.agreement import (
+    limits_by_clusters,
+    limits_with_mean,
+    limits_with_repeats,
+)
 from masrel.errors import ParameterError
 from masrel.ratings import Reading
 from tests.cli.process import Caller
@@ -109,3 +114,29 @@ def test_what_is_undefined_says_so(masrel: Caller, tmp_path: Path) -> None:
         0,
         True,
     )
+
+
+@pytest.mark.parametrize("kind", ["difference", "ratio"])
+def test_clusters_are_left_out(masrel: Caller, tmp_path: Path, kind: Any) -> None:
+    rng, file = np.random.default_rng(3), tmp_path / "eyes.csv"
+    patient, level = np.arange(24) // 2, rng.normal(50.0, 9.0, 24)
+    x = level + rng.normal(0.0, 2.0, 12)[patient] + rng.normal(size=24)
+    frame = pd.DataFrame({"patient": patient, "x": x, "y": level + rng.normal(size=24)})
+    frame["eye"] = [f"{p}{'LR'[k % 2]}" for k, p in enumerate(patient)]
+    frame.to_csv(file, index=False)
+    columns = ("--item", "eye", "--raters", "x,y", "--clusters", "patient")
+    name = {"difference": "limits_with_repeats", "ratio": "limits_of_ratios"}[kind]
+    of_kind = () if kind == "difference" else ("--kind", kind)
+    (found,) = answers(masrel, name, file, *columns, *of_kind)
+    measure = partial(limits_with_repeats, item="eye", first="x", second="y", kind=kind)
+    known = limits_by_clusters(frame, measure, clusters="patient")
+    for of in ("bias", "low", "high"):
+        assert found[of] == pytest.approx(getattr(known, of))
+        interval = getattr(known, f"{of}_interval")
+        ends = found[f"{of}_interval"]
+        assert (ends["low"], ends["high"]) == pytest.approx(
+            (interval.low, interval.high)
+        )
+    shown = masrel("limits", file, *columns, *of_kind, "--explain").out
+    assert "leaving out one cluster at a time" in shown
+    assert "MOVER" not in shown

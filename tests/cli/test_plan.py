@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from masrel.planning import units_needed
 from tests.cli.process import Caller
 
 KAPPA = (
@@ -187,3 +188,11 @@ def test_bad_input_is_one_sentence(
     assert done.code == 2
     assert words in done.err
     assert "Traceback" not in done.err
+
+
+def test_units_of_any_estimate(masrel: Caller) -> None:
+    call = ("plan", "--error", "0.04", "--items", "20", "--half-width", "0.03")
+    n = units_needed(0.04, 20, half_width=0.03)
+    assert f"{n} are needed" in masrel(*call).out
+    document = json.loads(masrel(*call, "--level", "0.9", "--json", "-").out)
+    assert document["n_needed"] == units_needed(0.04, 20, half_width=0.03, level=0.9)

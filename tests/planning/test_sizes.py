@@ -5,9 +5,10 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from scipy import stats
 
 from masrel.errors import ParameterError
-from masrel.planning import Plan, Study, precision, sample_size
+from masrel.planning import Plan, Study, precision, sample_size, units_needed
 
 KAPPA: dict[str, Any] = {
     "coefficient": "fleiss_kappa",
@@ -194,3 +195,12 @@ def test_sizes_far_from_the_aim_are_told_by_few_studies() -> None:
     ]
     few = precision(replace(study, half_width=None, n_raters=4, n_studies=700))
     assert few.n_studies == 700
+
+
+@pytest.mark.parametrize(("half", "level"), [(0.5, 0.95), (3.0, 0.8), (0.031, 0.99)])
+def test_the_least_number_that_is_enough(half: float, level: float) -> None:
+    def half_of(n: int) -> float:
+        return float(stats.t.interval(level, n - 1, scale=math.sqrt(20 / n))[1])
+
+    n = units_needed(1.0, 20, half_width=half, level=level)
+    assert half_of(n) <= half < half_of(n - 1)
