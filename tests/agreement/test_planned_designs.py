@@ -20,27 +20,29 @@ def pilot(rng: np.random.Generator, n: int = 40, n_raters: int = 3) -> GStudy:
     return g_study(frame, of="person", facets=["rater"])
 
 
-def test_intervals_are_those_of_studies_that_are_drawn() -> None:
+@pytest.mark.parametrize(
+    ("n", "k", "of"), [(25, 4, "dependability"), (100, 2, "generalizability")]
+)
+def test_intervals_are_those_of_studies_that_are_drawn(n: int, k: int, of: Any) -> None:
     # 200 studies each: five standard errors of the difference, fails once in 10⁶
     rng, known = np.random.default_rng(4), pilot(np.random.default_rng(1))
     true = np.sqrt([max(part, 0.0) for part in known.components.values()])
-    found = []
+    drawn = []
     for _ in range(200):
-        person, rater, rest = (rng.normal(size=n) for n in ((25, 1), (1, 4), (25, 4)))
+        person, rater, rest = (rng.normal(size=size) for size in ((n, 1), k, (n, k)))
         grade = true[0] * person + true[1] * rater + true[2] * rest
         codes = np.indices(grade.shape).reshape(2, -1)
         frame = pd.DataFrame(dict(zip(("person", "rater"), codes, strict=True)))
-        study = g_study(
-            frame.assign(grade=grade.ravel()), of="person", facets=["rater"]
-        )
-        found.append(study.d_study(rater=4).dependability_interval)
-    plan = design_precision(known, {"rater": 4}, n_persons=25)
-    for name in ("low", "high"):
-        ends = np.array([getattr(of, name) for of in found])
+        frame["grade"] = grade.ravel()
+        study = g_study(frame, of="person", facets=["rater"])
+        drawn.append(getattr(study.d_study(rater=k), f"{of}_interval"))
+    plan = design_precision(known, {"rater": k}, n_persons=n, aim=0.6, of=of)
+    low, high = np.array([(interval.low, interval.high) for interval in drawn]).T
+    planned = plan.low, plan.high, plan.high - plan.low
+    for expected, ends in zip(planned, (low, high, high - low), strict=True):
         error = math.sqrt(2.0) * ends.std() / math.sqrt(200)
-        assert getattr(plan, name) == pytest.approx(ends.mean(), abs=5.0 * error)
-    chance = np.mean([of.low >= 0.6 for of in found])
-    plan = design_precision(known, {"rater": 4}, n_persons=25, aim=0.6)
+        assert expected == pytest.approx(ends.mean(), abs=5.0 * error)
+    chance = np.mean(low >= 0.6)
     assert plan.chance == pytest.approx(chance, abs=5.0 * math.sqrt(0.5 / 200))
 
 
