@@ -8,9 +8,18 @@ import itertools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from types import ModuleType, TracebackType
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Generic,
+    NamedTuple,
+    Self,
+    TypeVar,
+)
 
 from masrel.errors import (
     BusError,
@@ -20,11 +29,18 @@ from masrel.errors import (
     ParameterError,
 )
 from masrel.lab.hess._clock import Clock, SimulatedClock
-from masrel.lab.hess.device import BackendOptions, DeviceSetup
+from masrel.lab.hess.device import (
+    BackendOptions,
+    Device,
+    DeviceSetup,
+    IdleCommand,
+)
 from masrel.lab.hess.limits import DeviceLimits
 
 if TYPE_CHECKING:
     import can  # loaded when a bus is opened
+
+    from masrel.lab.hess._emulated import EmulatedAmplifier  # which is on such a bus
 
 _BITRATE, _DATA_BITRATE = 1_000_000, 5_000_000  # bits a second; the latter of CAN-FD
 
@@ -75,19 +91,6 @@ class Frame(NamedTuple):
     is_error: bool = False
 
 
-class Peer(Protocol):
-    """An emulated amplifier in the same thread."""
-
-    def serve(self) -> None:
-        """Do what is due by now, and take in the frames that wait."""
-
-    def next_due_ns(self) -> int | None:
-        """Return when it will act next."""
-
-    def close(self) -> None:
-        """Leave the bus."""
-
-
 class Link:
     """One end of a bus, as `connected` opens it; a context manager that leaves it.
 
@@ -99,13 +102,13 @@ class Link:
         The clock of deadlines.
     options : BusOptions
         Whose bus it is.
-    peer : Peer or None, optional
+    peer : EmulatedAmplifier or None, optional
         An emulator in the same thread, which is served whenever this end sends or
         waits, so that a bus works on a simulated clock too, and closed with it.
 
     Attributes
     ----------
-    peer : Peer or None
+    peer : EmulatedAmplifier or None
         That emulator.
     """
 
@@ -115,7 +118,7 @@ class Link:
         clock: Clock,
         options: "BusOptions",
         *,
-        peer: Peer | None = None,
+        peer: "EmulatedAmplifier | None" = None,
     ) -> None:
         self._can = _python_can(options.name)
         self._name, self._is_fd = options.name, options.is_fd
@@ -290,7 +293,7 @@ class BusOptions(BackendOptions, ABC):
         clock: Clock,
         *,
         accepted: tuple[int, ...] | None = None,
-        peer: Peer | None = None,
+        peer: "EmulatedAmplifier | None" = None,
     ) -> Link:
         """Open one end of a bus; `accepted` identifiers are filtered in the kernel."""
         # Where no kernel filters, whoever receives looks at the identifiers: filters of
@@ -337,7 +340,6 @@ class Node(ABC):
         self.link = link
         self.clock = clock
         self.name = name  # in messages
-        self._n_overdue = 0  # frames that came after the deadline
         self.n_foreign = self.n_errors = 0  # frames
 
     @abstractmethod
@@ -345,23 +347,17 @@ class Node(ABC):
         """Take in a frame that is no error."""
 
     def _receive_until(self, is_there: Callable[[], bool], deadline_ns: int) -> bool:
-        # Whether what is waited for came in time
-        self._n_overdue = 0
+        # Whether what is waited for came in time. What waits is taken after the
+        # deadline too, because this end may be late; but only so many frames, because
+        # others may never fall silent.
+        n_overdue = 0
         while not is_there():
-            frame = self._next_frame(deadline_ns)
-            if frame is None:
+            n_overdue += self.clock.now_ns() > deadline_ns
+            frame = self.link.receive(deadline_ns)
+            if frame is None or n_overdue > _MAX_OVERDUE:
                 return False
             self._take_in(frame)
         return True
-
-    def _next_frame(self, deadline_ns: int) -> Frame | None:
-        # What waits is taken after the deadline too, because this end may be late;
-        # but only so many frames, because others may never fall silent.
-        if self.clock.now_ns() > deadline_ns:
-            self._n_overdue += 1
-            if self._n_overdue > _MAX_OVERDUE:
-                return None
-        return self.link.receive(deadline_ns)
 
     def receive_waiting(self) -> None:
         """Receive all frames that wait: late replies, errors, frames of others."""
@@ -373,18 +369,16 @@ class Node(ABC):
         raise BusError(f"{self.name}: the bus is flooded with frames", "flooded")
 
     def _take_in(self, frame: Frame) -> None:
+        error_class = frame.identifier
         if not frame.is_error:
             self._sort(frame)
-        elif frame.identifier & BUS_RESTARTED:
             return
-        elif frame.identifier & BUS_OFF:
+        if error_class & BUS_RESTARTED:
+            return
+        if error_class & BUS_OFF:
             raise BusError(
                 f"{self.name}: bus off, the host's controller has given up", "bus-off"
             )
-        else:
-            self._count_error(frame.identifier)
-
-    def _count_error(self, error_class: int) -> None:
         self.n_errors += 1
         if self.n_errors % (_MAX_ERROR_FRAMES + 1) == 0:  # it can be let go between two
             raise BusError(
@@ -441,6 +435,54 @@ def options_of(setup: DeviceSetup, kind: type[_Options]) -> _Options:
             f"{name}: needs a real clock, its bus is outside this process"
         )
     return options
+
+
+class CanDevice(Device, Generic[_Options]):
+    """A device on a CAN bus; what it is, and does there, is a subclass's."""
+
+    def __init__(
+        self, setup: DeviceSetup, options: _Options, connected: Callable[..., Link]
+    ) -> None:
+        self.simulated = not options.moves_hardware
+        self._setup = setup
+        self._options = options
+        self._connected = connected
+
+    @abstractmethod
+    def _bring_up(self) -> None:
+        """Make it ready on the bus that is joined."""
+
+    @abstractmethod
+    def _release(self) -> None:
+        """Idle it."""
+
+    @abstractmethod
+    def _idle_arguments(self) -> tuple[int, ...]:
+        """Return what `prepare` of its module needs beside interface and channel."""
+
+    def _start(self) -> None:
+        setup = self._setup
+        link = self._connected(
+            self._options, clock=setup.clock, hand=setup.hand, range_end=setup.range_end
+        )
+        self.emulator = link.peer
+        with ExitStack() as failing:  # then the bus is left
+            self._link = failing.enter_context(link)
+            self._bring_up()
+            failing.pop_all()
+
+    def _stop(self) -> None:
+        with self._link:  # which is left whatever comes
+            self._release()
+
+    def idle_command(self) -> IdleCommand | None:
+        """Return how another process can idle it, once it is open."""
+        options = self._options
+        if not options.is_shared:
+            return None
+        arguments = map(str, self._idle_arguments())
+        where = (options.interface, options.channel, *arguments)
+        return IdleCommand(type(self).__module__, where)
 
 
 def check_angle(name: str, angle: float) -> None:

@@ -1,31 +1,33 @@
 """The frames of a moteus controller: registers to the bytes of a CAN-FD frame and back.
 
 Source of the frames: the maker's documentation (mjbots/moteus, docs/protocol/can.md and
-registers.md); those of streams, with which its settings are read, as its own Python
+registers.md); those of its console, with which settings are read, as its own Python
 client sends them.
 """
 
+import io
 import math
 import struct
-from collections.abc import Iterable, Iterator
-from typing import Literal, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 from masrel.errors import FrameError
 
-INT8, INT16, INT32, FLOAT = range(4)  # of what type the values of a subframe are
+# What a subframe does, its first byte: registers that are written, asked for, or that
+# an answer has; one that cannot be written or read; text to the console, text from it,
+# and so much text asked for
+WRITE, READ, ANSWER = 0x00, 0x10, 0x20
+WRITE_ERROR, READ_ERROR = 0x30, 0x31
+TO_CONSOLE, FROM_CONSOLE, POLL = 0x40, 0x41, 0x42
+_PADDING = 0x50
+_NOT_REGISTERS = (WRITE_ERROR, READ_ERROR, TO_CONSOLE, FROM_CONSOLE, POLL)
+
+INT8, INT16, INT32, FLOAT = range(4)  # of what type the values of registers are
 _FORMATS = ("b", "h", "i", "f")  # of `struct`
 _MOST_NEGATIVE = (-(2**7), -(2**15), -(2**31))  # which integers mean nan
 
-_WRITE, _READ, _ANSWER, _ERRORS, _STREAMS, _PADDING = (
-    *(0x00, 0x10, 0x20, 0x30, 0x40),
-    0x50,
-)
-_ACTS: dict[int, Literal["write", "answer"]] = {_WRITE: "write", _ANSWER: "answer"}
-_REFUSED: tuple[Literal["write", "read"], ...] = ("write", "read")
-_SAID: tuple[Literal["says", "is told"], ...] = ("is told", "says")
-
+CONSOLE = 1  # its channel
 _LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)  # bytes that a CAN-FD frame may have
-_MOST_BYTES_OF_A_NUMBER = 5
 
 # What one of an integer stands for, as int8, int16 and int32
 _POSITION = (1e-2, 1e-4, 1e-5)  # revolutions
@@ -43,47 +45,20 @@ _SCALES = {
 }
 
 
-class Values(NamedTuple):
-    """Registers that are written, or that an answer reports."""
+class Subframe(NamedTuple):
+    """A part of a frame."""
 
-    act: Literal["write", "answer"]
-    kind: int  # INT8 to FLOAT
-    first: int  # register; the others follow it
-    values: tuple[float, ...]  # as on the bus: `value_of` scales them
-
-
-class Read(NamedTuple):
-    """Registers that are asked for."""
-
-    kind: int  # as which the answer is to have them
-    first: int
-    n: int
+    act: int  # WRITE to POLL
+    kind: int  # INT8 to FLOAT, of registers
+    first: int  # register, which others may follow; or the console's channel
+    n: int = 1  # registers, number of an error, or bytes of text
+    values: tuple[float, ...] = ()  # as on the bus: `value_of` scales them
+    text: bytes = b""
 
 
-class Refusal(NamedTuple):
-    """A register that could not be written or read."""
-
-    act: Literal["write", "read"]
-    register: int
-    number: int  # of the error
-
-
-class Stream(NamedTuple):
-    """Text of the console, to the controller or from it."""
-
-    act: Literal["is told", "says"]
-    data: bytes
-
-
-class Poll(NamedTuple):
-    """A request for text of the console."""
-
-    most: int  # bytes of the answer
-
-
-Subframe = Values | Read | Refusal | Stream | Poll
-
-_CONSOLE = 1  # the stream's channel
+def write(kind: int, first: int, *values: float) -> Subframe:
+    """Return what writes registers."""
+    return Subframe(WRITE, kind, first, len(values), values)
 
 
 def value_of(register: int, kind: int, raw: float) -> float:
@@ -119,102 +94,65 @@ def encode(subframes: Iterable[Subframe]) -> bytes:
 
 
 def _encoded(subframe: Subframe) -> bytes:
-    match subframe:
-        case Values(act, kind, first, values):
-            begin = _WRITE if act == "write" else _ANSWER
-            numbers = struct.pack(f"<{len(values)}{_FORMATS[kind]}", *values)
-            return _head(begin, kind, len(values), first) + numbers
-        case Read(kind, first, n):
-            return _head(_READ, kind, n, first)
-        case Refusal(act, register, number):
-            begin = _ERRORS + _REFUSED.index(act)
-            return bytes((begin,)) + _varuint(register) + _varuint(number)
-        case Stream(act, data):
-            begin = _STREAMS + _SAID.index(act)
-            return bytes((begin, _CONSOLE)) + _varuint(len(data)) + data
-        case Poll(most):
-            return bytes((_STREAMS + 2, _CONSOLE)) + _varuint(most)
-
-
-def _head(begin: int, kind: int, n: int, first: int) -> bytes:
+    act, kind, first, n, values, text = subframe
+    if act in _NOT_REGISTERS:
+        return bytes((act,)) + _varuint(first) + _varuint(n) + text
+    act += 4 * kind
     # A number of registers up to three is in the first byte
-    begin += 4 * kind
-    if 0 < n <= 3:
-        return bytes((begin + n,)) + _varuint(first)
-    return bytes((begin,)) + _varuint(n) + _varuint(first)
+    head = bytes((act + n,)) if 0 < n <= 3 else bytes((act,)) + _varuint(n)
+    numbers = struct.pack(f"<{len(values)}{_FORMATS[kind]}", *values)
+    return head + _varuint(first) + numbers
 
 
 def _varuint(value: int) -> bytes:
     # Seven bits a byte, lowest first; the eighth says that another follows
     if not 0 <= value < 2**32:
         raise FrameError(f"moteus: needs a number of 32 bits, got {value}")
-    made = bytearray()
-    while value > 0x7F:
-        made.append(0x80 | value & 0x7F)
-        value >>= 7
-    made.append(value)
-    return bytes(made)
+    if value <= 0x7F:
+        return bytes((value,))
+    return bytes((0x80 | value & 0x7F,)) + _varuint(value >> 7)
 
 
 def decode(data: bytes) -> tuple[Subframe, ...]:
     """Return the subframes of a frame, without padding."""
-    return tuple(_Reader(data).subframes())
+    stream, subframes = io.BytesIO(data), []
+    while head := stream.read(1):
+        if head[0] != _PADDING:
+            subframes.append(_decoded(head[0], stream))
+    return tuple(subframes)
 
 
-class _Reader:
-    """The bytes of a frame, taken from its beginning."""
+def _decoded(head: int, stream: io.BytesIO) -> Subframe:
+    if head < WRITE_ERROR:
+        act, kind, n = head & 0x30, head >> 2 & 3, head & 3 or _read_varuint(stream)
+        first, layout = _read_varuint(stream), f"<{n}{_FORMATS[kind]}"
+        if act == READ:
+            return Subframe(READ, kind, first, n)
+        # before `struct` is asked for the size of a number that makes no sense
+        data = _read(stream, struct.calcsize(layout) if n <= _LENGTHS[-1] else n)
+        return Subframe(act, kind, first, n, struct.unpack(layout, data))
+    if head not in _NOT_REGISTERS:
+        raise FrameError(f"moteus: needs a known subframe, got {head:#04x}")
+    first, n = _read_varuint(stream), _read_varuint(stream)
+    text = _read(stream, n) if head in (TO_CONSOLE, FROM_CONSOLE) else b""
+    return Subframe(head, 0, first, n, text=text)
 
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._place = 0
 
-    def subframes(self) -> Iterator[Subframe]:
-        while self._place < len(self._data):
-            (begin,) = self._bytes(1)
-            if begin != _PADDING:
-                yield self._subframe(begin)
+def _read_varuint(stream: io.BytesIO) -> int:
+    value = 0
+    for shift in range(0, 35, 7):
+        byte = _read(stream, 1)[0]
+        value |= (byte & 0x7F) << shift
+        if byte <= 0x7F:
+            return value
+    raise FrameError("moteus: needs a number of 32 bits, got one without an end")
 
-    def _subframe(self, begin: int) -> Subframe:
-        if begin < _ERRORS:
-            return self._registers(begin & 0x30, begin >> 2 & 3, begin & 3)
-        if begin in (_ERRORS, _ERRORS + 1):
-            act = _REFUSED[begin - _ERRORS]
-            return Refusal(act, self._varuint(), self._varuint())
-        if not _STREAMS <= begin <= _STREAMS + 2 or self._varuint() != _CONSOLE:
-            raise self._error(f"a subframe {begin:#04x}")
-        size = self._varuint()
-        if begin == _STREAMS + 2:
-            return Poll(size)
-        return Stream(_SAID[begin - _STREAMS], self._bytes(size))
 
-    def _registers(self, act: int, kind: int, n: int) -> Subframe:
-        n = n or self._varuint()
-        first = self._varuint()
-        if act == _READ:
-            return Read(kind, first, n)
-        layout = f"<{n}{_FORMATS[kind]}"
-        if n > len(self._data):  # before `struct` is asked for its size
-            raise self._error(f"{n} registers")
-        values = struct.unpack(layout, self._bytes(struct.calcsize(layout)))
-        return Values(_ACTS[act], kind, first, values)
-
-    def _varuint(self) -> int:
-        value = 0
-        for place in range(_MOST_BYTES_OF_A_NUMBER):
-            (byte,) = self._bytes(1)
-            value |= (byte & 0x7F) << 7 * place
-            if byte <= 0x7F:
-                return value
-        raise self._error("a number without an end")
-
-    def _bytes(self, n: int) -> bytes:
-        begin, self._place = self._place, self._place + n
-        if self._place > len(self._data):
-            raise self._error("one that ends in the middle of a subframe")
-        return self._data[begin : self._place]
-
-    def _error(self, got: str) -> FrameError:
-        return FrameError(
-            f"moteus: needs a frame of known subframes, got {got} "
-            f"({self._data.hex() or 'empty'})"
+def _read(stream: io.BytesIO, n: int) -> bytes:
+    data = stream.read(n)
+    if len(data) < n:
+        raise FrameError(
+            f"moteus: needs a whole frame, got {stream.getvalue().hex(' ')}, which "
+            "ends in the middle of a subframe"
         )
+    return data

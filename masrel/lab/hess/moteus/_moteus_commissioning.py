@@ -18,7 +18,7 @@ from masrel.lab.hess._free_arm import (
     check_torque_mode,
 )
 from masrel.lab.hess.moteus._frames import INT8, INT32
-from masrel.lab.hess.moteus._moteus_device import ReadyServo
+from masrel.lab.hess.moteus._moteus_device import ReadyServo, Servo
 from masrel.lab.hess.moteus._moteus_options import (
     DRIVEN,
     FAULTS,
@@ -28,7 +28,6 @@ from masrel.lab.hess.moteus._moteus_options import (
     TIMEOUT,
     MoteusOptions,
 )
-from masrel.lab.hess.moteus._servo import Servo
 
 N_NODES = 127
 _PROBE_PATIENCE_S = 0.01

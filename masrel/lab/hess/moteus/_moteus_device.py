@@ -1,4 +1,8 @@
-"""One moteus, driven as a device: brought up, told a torque a tick, stopped.
+"""One moteus: asked and told, brought up, driven as a device, stopped.
+
+An answer carries no number. So each question asks for the controller's counter of
+milliseconds as another type than the three before: an answer to an earlier one is told
+by that, and one that is repeated later by its count.
 
 A torque and its answer are one exchange a tick: an answer is read in the tick after,
 when it has long come, and says what was 0.9 ms ago. In the process of a watchdog
@@ -9,31 +13,86 @@ import atexit
 import math
 from collections import deque
 from collections.abc import Callable
-from contextlib import ExitStack
+from typing import NamedTuple
 
-from masrel.errors import BusError, DeviceError, IdledError, LimitExceededError
-from masrel.lab.hess._can import Link, check_angle, options_of
+from masrel.errors import (
+    BusError,
+    DeviceError,
+    DeviceTimeoutError,
+    FrameError,
+    IdledError,
+    LimitExceededError,
+)
+from masrel.lab.hess._can import (
+    CanDevice,
+    Frame,
+    Link,
+    Node,
+    check_angle,
+    options_of,
+)
 from masrel.lab.hess._clock import Clock, RealClock
-from masrel.lab.hess.device import Device, DeviceSetup, IdleCommand, Reading
-from masrel.lab.hess.moteus._frames import INT8
+from masrel.lab.hess.device import DeviceSetup, Reading
+from masrel.lab.hess.moteus._frames import (
+    CONSOLE,
+    FLOAT,
+    INT8,
+    POLL,
+    READ,
+    READ_ERROR,
+    TO_CONSOLE,
+    WRITE_ERROR,
+    Subframe,
+    decode,
+    encode,
+    value_of,
+    write,
+)
 from masrel.lab.hess.moteus._moteus_emulator import connected
 from masrel.lab.hess.moteus._moteus_options import (
+    CODE,
+    COMMAND,
+    COUNTER,
     DRIVEN,
     FAULT,
     FAULTS,
     FREE,
     HOME_STATE,
+    INTEGRAL_SCALE,
     LIMITS,
+    MODE,
     OUTPUT_KNOWN,
+    POSITION,
     PREPARING,
     STOPPED,
     TIMEOUT,
+    TORQUE,
+    VOLTAGE,
+    WATCHDOG,
     MoteusOptions,
 )
-from masrel.lab.hess.moteus._servo import Servo, State
+
+_QUERY = (
+    Subframe(READ, INT8, MODE),
+    Subframe(READ, FLOAT, POSITION, 3),
+    Subframe(READ, INT8, VOLTAGE, 3),
+)
+_STOP = write(INT8, MODE, STOPPED)
+_ANSWERED = 0x8000  # in an identifier: the host, number 0, wants an answer
+
+_SAMPLING_NS = 140_000  # from a question to the sample: own estimate for 64 bytes
+_PATIENCE_S = 0.02  # outside the loop
+_CONSOLE_NS, _POLL_NS = 50_000_000, 2_000_000  # for text, for a part of it
+_CONSOLE_BYTES = 48
+
+# What the counter of an answer may lag behind the host's clock, ms, and over how long
+# a time the two are compared: the controller's clock may be 1 % off
+_MOST_LAG = 2
+_COMPARED_NS = 100_000_000
+
 
 _RECENT_NS = 1_500_000  # since a torque: then its answer is still of this tick
-_PATIENCE_S = 0.001  # for a question in the loop: a tick
+_TICK_S = 0.001  # for a question in the loop
 _LATE_S = 0.0015  # for the answer to a torque, of which a tick has passed
 _PREPARING_NS = 50_000_000  # from a stop to the first torque; chosen
 
@@ -42,6 +101,159 @@ _MAX_LIMITED = 2  # answers in a row that say that something limits the torque
 _TORQUE_TOLERANCE = 1.0  # N·m at the elbow; chosen
 _TOLD_TICKS = 4  # a current takes some ticks to follow
 _MAX_OFF = 10  # answers in a row
+
+
+class State(NamedTuple):
+    """What an answer says."""
+
+    time_ns: int  # when it was sampled, as this end has it
+    mode: int
+    position: float  # turns
+    torque_nm: float  # its own estimate from the current, at the output
+    code: int
+
+
+class Servo(Node):
+    """A moteus on a bus."""
+
+    def __init__(self, link: Link, clock: Clock, options: MoteusOptions) -> None:
+        super().__init__(link, clock, f"moteus {options.servo}")
+        self._options = options
+        self._answer: dict[int, float] = {}  # by register
+        self._counter_kind = INT8
+        self._accepted: tuple[int, int] | None = None  # when that was asked, its count
+        self._console = b""
+        self.asked_ns = 0
+        self.is_asked = False  # whether an answer may still come
+
+    # In the loop
+
+    def ask(self, *commands: Subframe) -> None:
+        """Send commands and a question; `answer` waits for what comes of it."""
+        self._counter_kind = (self._counter_kind + 1) % 4
+        self._answer = {}
+        counter = Subframe(READ, self._counter_kind, COUNTER)
+        self.asked_ns = self._send(*commands, *_QUERY, counter)
+        self.is_asked = True
+
+    def command(self, torque_nm: float) -> None:
+        """Send a torque of the elbow, and a question."""
+        # All registers each time: one that is left out takes its default, and scales
+        # of 1 would make it hold a position
+        options = self._options
+        feedforward = options.output_torque(torque_nm)
+        most = options.largest_torque_nm / options.gear_ratio
+        self.ask(
+            write(INT8, MODE, DRIVEN),
+            write(FLOAT, COMMAND, math.nan, 0.0, feedforward, 0.0, 0.0, most),
+            write(FLOAT, WATCHDOG, options.watchdog_ms * 1e-3),
+            write(FLOAT, INTEGRAL_SCALE, 0.0),
+        )
+
+    def answer(self, patience_s: float = _PATIENCE_S) -> State:
+        """Return the answer to the last question, which may be waiting already."""
+        self.is_asked = False
+        deadline_ns = self.asked_ns + round(patience_s * 1e9)
+        self._wait_until(self._is_current, deadline_ns, "no answer")
+        answer, self._answer = self._answer, {}
+        if math.isnan(answer[POSITION]):
+            raise FrameError(f"{self.name}: its position is no number")
+        self._accepted = self.asked_ns, int(answer[COUNTER])
+        return State(
+            min(self.asked_ns + _SAMPLING_NS, self.clock.now_ns()),
+            int(answer[MODE]),
+            answer[POSITION],
+            answer[TORQUE],
+            int(answer[CODE]),
+        )
+
+    def _is_current(self) -> bool:
+        # Whether an answer is there, and none that the controller has given before
+        count = self._answer.get(COUNTER)
+        if count is None or self._accepted is None:
+            return count is not None
+        asked_ns, count_then = self._accepted
+        passed_ns = self.asked_ns - asked_ns
+        lag = round(passed_ns * 1e-6) - (int(count) - count_then)
+        if passed_ns < _COMPARED_NS and (lag + 128) % 256 - 128 > _MOST_LAG:
+            self._answer = {}
+        return bool(self._answer)
+
+    # Outside the loop
+
+    def stop(self) -> State:
+        """Stop it, which also clears a fault and its timeout, until it confirms."""
+        self.insist(self._stops, "IF THE ARM IS NOT FREE, SWITCH ITS SUPPLY OFF")
+        self.ask()
+        return self.answer()
+
+    def _stops(self, _since_s: float) -> bool:
+        self.ask(_STOP)
+        return self.answer().mode == STOPPED
+
+    def get(
+        self, kind: int, first: int, n: int = 1, *, patience_s: float = _PATIENCE_S
+    ) -> tuple[float, ...]:
+        """Return registers."""
+        self._answer = {}
+        sent_ns = self._send(Subframe(READ, kind, first, n))
+        registers = range(first, first + n)
+        self._wait_until(
+            lambda: registers[-1] in self._answer,
+            sent_ns + round(patience_s * 1e9),
+            f"no answer for register {first:#05x}",
+        )
+        return tuple(self._answer.pop(register) for register in registers)
+
+    def set(self, register: int, value: float) -> None:
+        """Write a register."""
+        self._send(write(FLOAT, register, value))
+
+    def setting(self, name: str) -> float:
+        """Return a setting, which its console alone tells."""
+        self._console = b""
+        text = f"conf get {name}\n".encode()
+        question = Subframe(TO_CONSOLE, 0, CONSOLE, len(text), text=text)
+        deadline_ns = self._send(question, wants_answer=False) + _CONSOLE_NS
+        while not self._console.endswith(b"\n"):
+            if self._send(Subframe(POLL, 0, CONSOLE, _CONSOLE_BYTES)) > deadline_ns:
+                raise DeviceTimeoutError(f"{self.name}: does not say its {name}")
+            self._receive_until(lambda: False, self.clock.now_ns() + _POLL_NS)
+        try:
+            return float(self._console)
+        except ValueError as error:
+            raise DeviceError(
+                f"{self.name}: needs a firmware with {name}, it says {self._console!r}"
+            ) from error
+
+    # The bus
+
+    def _send(self, *subframes: Subframe, wants_answer: bool = True) -> int:
+        identifier = self._options.servo + (_ANSWERED if wants_answer else 0)
+        return self.link.send(Frame(identifier, encode(subframes)))
+
+    def _wait_until(
+        self, is_there: Callable[[], bool], deadline_ns: int, lacking: str
+    ) -> None:
+        if not self._receive_until(is_there, deadline_ns):
+            raise DeviceTimeoutError(f"{self.name}: {lacking} in time")
+
+    def _sort(self, frame: Frame) -> None:
+        if frame.identifier != self._options.servo << 8:
+            self.n_foreign += 1
+            return
+        for act, kind, first, number, values, text in decode(frame.data):
+            if act in (WRITE_ERROR, READ_ERROR):
+                raise DeviceError(
+                    f"{self.name}: does not let register {first:#05x} be "
+                    f"{'written' if act == WRITE_ERROR else 'read'} (error {number})"
+                )
+            if first == COUNTER and kind != self._counter_kind:
+                self._answer = {}  # to an earlier question
+                return
+            for register, raw in enumerate(values, first):
+                self._answer[register] = value_of(register, kind, raw)
+            self._console += text
 
 
 class ReadyServo:
@@ -90,30 +302,21 @@ def stopped_itself(servo: Servo, code: int) -> IdledError:
     return IdledError(f"{servo.name}: has stopped itself, code {code}: {kind}", kind)
 
 
-class MoteusDevice(Device):
+class MoteusDevice(CanDevice[MoteusOptions]):
     """A moteus on a CAN-FD bus, in torque mode from the first torque on."""
 
     name = "moteus"
 
     def __init__(self, setup: DeviceSetup, options: MoteusOptions) -> None:
-        self.simulated = not options.moves_hardware
-        self._setup = setup
-        self._options = options
+        super().__init__(setup, options, connected)
         self._driven_ns: int | None = None  # since when it has been told torques
         self._commanded: deque[float] = deque([0.0], maxlen=_TOLD_TICKS)  # N·m
         self._n_limited = self._n_off = 0  # answers in a row
         self._has_let_go = False  # by itself, or because somebody else stopped it
 
-    def _start(self) -> None:
-        setup = self._setup
-        link = connected(
-            self._options, clock=setup.clock, hand=setup.hand, range_end=setup.range_end
-        )
-        self.emulator = link.peer
-        with ExitStack() as failing:  # then the bus is left
-            self._link = failing.enter_context(link)
-            self._servo = ReadyServo(link, setup.clock, self._options).servo
-            failing.pop_all()
+    def _bring_up(self) -> None:
+        ready = ReadyServo(self._link, self._setup.clock, self._options)
+        self._servo = ready.servo
 
     def _read(self) -> Reading:
         try:
@@ -137,7 +340,7 @@ class MoteusDevice(Device):
             self._driven_ns = None
             return servo.stop()
         servo.ask()
-        return servo.answer(_PATIENCE_S)
+        return servo.answer(_TICK_S)
 
     def _timed_out(self) -> IdledError:
         return IdledError(
@@ -196,17 +399,11 @@ class MoteusDevice(Device):
         self._commanded.append(torque_nm)
         self._driven_ns = self._driven_ns or self._servo.asked_ns
 
-    def _stop(self) -> None:
-        with self._link:  # which is left whatever comes
-            self._servo.stop()
+    def _release(self) -> None:
+        self._servo.stop()
 
-    def idle_command(self) -> IdleCommand | None:
-        """Return how another process can stop it, once it is open."""
-        options = self._options
-        if not options.is_shared:
-            return None
-        where = (options.interface, options.channel, str(options.servo))
-        return IdleCommand("masrel.lab.hess.moteus._moteus_device", where)
+    def _idle_arguments(self) -> tuple[int, ...]:
+        return (self._options.servo,)
 
 
 def prepare(interface: str, channel: str, servo: str) -> Callable[[], object]:

@@ -7,18 +7,24 @@ what was before the commands that came with the question.
 
 import math
 from collections import deque
+from collections.abc import Iterator
 
 from masrel.lab.hess._can import Frame, Link
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._emulated import EmulatedAmplifier, InjectedFault, Motor
 from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.moteus._frames import (
-    Poll,
-    Read,
-    Refusal,
-    Stream,
+    ANSWER,
+    CONSOLE,
+    FROM_CONSOLE,
+    INT8,
+    POLL,
+    READ,
+    READ_ERROR,
+    TO_CONSOLE,
+    WRITE,
+    WRITE_ERROR,
     Subframe,
-    Values,
     decode,
     encode,
     raw_of,
@@ -58,7 +64,7 @@ _OUTSIDE_LIMITS, _TORQUE_LIMITED, _POSITION_LIMITED = 39, 102, 103
 _KP_SCALE, _KD_SCALE = 0x023, 0x024
 _NO_SUCH_REGISTER = 1
 _COUNTER_BITS = (8, 16, 32, 23)  # as int8, int16, int32 and float
-_COMMANDS = frozenset(range(0x020, 0x02E))
+_WRITABLE = frozenset((MODE, SET_POSITION, *range(0x020, 0x02E)))
 
 
 class MoteusEmulator(EmulatedAmplifier):
@@ -115,44 +121,40 @@ class MoteusEmulator(EmulatedAmplifier):
         self, frame: Frame, subframes: tuple[Subframe, ...], now_ns: int
     ) -> None:
         answer = [part for one in subframes for part in self._answers(one, now_ns)]
-        written: dict[int, float] = {}
-        for one in subframes:
-            if isinstance(one, Values):
-                for register, raw in enumerate(one.values, one.first):
-                    written[register] = value_of(register, one.kind, raw)
-        self._write(written, now_ns)
+        self._write(
+            {
+                register: value_of(register, one.kind, raw)
+                for one in subframes
+                if one.act == WRITE
+                for register, raw in enumerate(one.values, one.first)
+            },
+            now_ns,
+        )
         if not frame.identifier & 0x8000:
             return
-        other = self.faults.hit("renumbered-replies", now_ns) is not None
-        source = self._options.servo % 127 + 1 if other else self._options.servo
-        data = encode(answer)
-        if self.faults.hit("stale-replies", now_ns):
-            data = self._last_answer
-        self._last_answer = data
+        is_stale = self.faults.hit("stale-replies", now_ns)
+        self._last_answer = data = self._last_answer if is_stale else encode(answer)
+        source = self._options.servo
+        if self.faults.hit("renumbered-replies", now_ns):
+            source = source % 127 + 1
         identifier = source << 8 | frame.identifier >> 8 & 0x7F
         self._answer(Frame(identifier, data), now_ns + _REPLY_NS)
 
-    def _answers(self, subframe: Subframe, now_ns: int) -> list[Subframe]:
-        match subframe:
-            case Read(kind, first, n):
-                return [self._read(kind, first, n, now_ns)]
-            case Values(_, _, first, values):
-                written = range(first, first + len(values))
-                return [
-                    Refusal("write", register, _NO_SUCH_REGISTER)
-                    for register in written
-                    if register not in (MODE, SET_POSITION, *_COMMANDS)
-                ]
-            case Poll(most):
-                text, self._console = self._console[:most], self._console[most:]
-                return [Stream("says", text)]
-            case Stream("is told", data):
-                line = data.decode(errors="replace").strip()
-                value = self._settings.get(
-                    line.removeprefix("conf get "), "ERR unknown"
-                )
-                self._console += f"{value}\r\n".encode()
-        return []
+    def _answers(self, subframe: Subframe, now_ns: int) -> Iterator[Subframe]:
+        act, kind, first, n, _, text = subframe
+        if act == READ:
+            yield self._read(kind, first, n, now_ns)
+        elif act == WRITE:
+            for register in range(first, first + n):
+                if register not in _WRITABLE:
+                    yield Subframe(WRITE_ERROR, 0, register, _NO_SUCH_REGISTER)
+        elif act == TO_CONSOLE:
+            setting = text.decode(errors="replace").strip().removeprefix("conf get ")
+            value = self._settings.get(setting, "ERR unknown")
+            self._console += f"{value}\r\n".encode()
+        elif act == POLL:
+            text, self._console = self._console[:n], self._console[n:]
+            yield Subframe(FROM_CONSOLE, 0, CONSOLE, len(text), text=text)
 
     # What it is told
 
@@ -241,7 +243,7 @@ class MoteusEmulator(EmulatedAmplifier):
 
     def _foreign_frames(self) -> tuple[Frame, ...]:
         other = self._options.servo % 127 + 1
-        state = encode([Values("answer", 0, MODE, (FAULT,))])
+        state = encode([Subframe(ANSWER, INT8, MODE, 1, (FAULT,))])
         return (
             Frame(other << 8, state),
             Frame(other, state),  # to another
@@ -258,12 +260,12 @@ class MoteusEmulator(EmulatedAmplifier):
         for register in range(first, first + n):
             value = self._value(register, now_ns)
             if value is None:
-                return Refusal("read", register, _NO_SUCH_REGISTER)
+                return Subframe(READ_ERROR, 0, register, _NO_SUCH_REGISTER)
             if register == COUNTER:  # it wraps
                 bits = _COUNTER_BITS[kind]
                 value = (value + 2.0 ** (bits - 1)) % 2.0**bits - 2.0 ** (bits - 1)
             raws.append(raw_of(register, kind, value))
-        return Values("answer", kind, first, tuple(raws))
+        return Subframe(ANSWER, kind, first, n, tuple(raws))
 
     def _value(self, register: int, now_ns: int) -> float | None:
         if register == POSITION:

@@ -9,7 +9,6 @@ import atexit
 import itertools
 import math
 from collections.abc import Callable
-from contextlib import ExitStack
 
 from masrel.errors import (
     BusError,
@@ -20,9 +19,9 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
-from masrel.lab.hess._can import Frame, Link, Node, check_angle, options_of
+from masrel.lab.hess._can import CanDevice, Frame, Link, Node, check_angle, options_of
 from masrel.lab.hess._clock import Clock, RealClock
-from masrel.lab.hess.device import Device, DeviceSetup, IdleCommand, Reading
+from masrel.lab.hess.device import DeviceSetup, Reading
 from masrel.lab.hess.puck._bus import (
     MAX_TORQUE,
     decode_position,
@@ -322,7 +321,7 @@ def prepare(
     return lambda: release(node, torque_id=int(torque_id), mode_id=int(mode_id))
 
 
-class PuckDevice(Device):
+class PuckDevice(CanDevice[PuckOptions]):
     """A motor puck on a CAN bus, in torque mode while the device is open."""
 
     # The torque is set by a frame to this puck alone, not by the packed frame that sets
@@ -334,25 +333,12 @@ class PuckDevice(Device):
     name = "puck"
 
     def __init__(self, setup: DeviceSetup, options: PuckOptions) -> None:
-        self.simulated = not options.moves_hardware
-        self._setup = setup
-        self._options = options
+        super().__init__(setup, options, connected)
         self._n_left = _POLL_TICKS  # torques until the next of these questions
         self._next_is_mode = True
         self._n_unanswered = 0
         self._asked_units = 0  # the torque it was set to when its torque was requested
         self._n_lost = 0
-
-    def _start(self) -> None:
-        setup = self._setup
-        link = connected(
-            self._options, clock=setup.clock, hand=setup.hand, range_end=setup.range_end
-        )
-        self.emulator = link.peer
-        with ExitStack() as failing:  # then the bus is left
-            self._link = failing.enter_context(link)
-            self._bring_up()
-            failing.pop_all()
 
     def _bring_up(self) -> None:
         angle = self._options.angle_after_reset
@@ -447,20 +433,11 @@ class PuckDevice(Device):
                 "lost-torques",
             )
 
-    def _stop(self) -> None:
-        with self._link:  # which is left whatever comes
-            self._puck.release()
+    def _release(self) -> None:
+        self._puck.release()
 
-    def idle_command(self) -> IdleCommand | None:
-        """Return how another process can idle the puck, once it is open."""
-        options = self._options
-        if not options.is_shared:
-            return None
-        numbers = (options.puck, self._puck.torque_id, self._puck.mode_id)
-        return IdleCommand(
-            "masrel.lab.hess.puck._puck_device",
-            (options.interface, options.channel, *map(str, numbers)),
-        )
+    def _idle_arguments(self) -> tuple[int, ...]:
+        return self._options.puck, self._puck.torque_id, self._puck.mode_id
 
 
 def build(setup: DeviceSetup) -> PuckDevice:

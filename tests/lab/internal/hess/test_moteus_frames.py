@@ -14,39 +14,58 @@ from hypothesis import strategies as st
 
 from masrel.errors import FrameError
 from masrel.lab.hess.moteus._frames import (
+    ANSWER,
+    CONSOLE,
     FLOAT,
+    FROM_CONSOLE,
     INT8,
     INT16,
     INT32,
-    Poll,
-    Read,
-    Refusal,
-    Stream,
-    Values,
+    POLL,
+    READ,
+    READ_ERROR,
+    TO_CONSOLE,
+    WRITE,
+    WRITE_ERROR,
+    Subframe,
     decode,
     encode,
     raw_of,
     value_of,
+    write,
 )
 
-QUERY = (Read(INT8, 0, 1), Read(FLOAT, 1, 3), Read(INT8, 0x00D, 3))
+
+def read(kind: int, first: int, n: int = 1) -> Subframe:
+    return Subframe(READ, kind, first, n)
+
+
+def answered(kind: int, first: int, *values: float) -> Subframe:
+    return Subframe(ANSWER, kind, first, len(values), values)
+
+
+def text(act: int, said: bytes) -> Subframe:
+    return Subframe(act, 0, CONSOLE, len(said), text=said)
+
+
+QUERY = (read(INT8, 0), read(FLOAT, 1, 3), read(INT8, 0x00D, 3))
 
 
 def torque(torque_nm: float, most_nm: float, watchdog_s: float) -> tuple:
     return (
-        Values("write", INT8, 0, (10,)),
-        Values("write", FLOAT, 0x020, (nan, 0.0, torque_nm, 0.0, 0.0, most_nm)),
-        Values("write", FLOAT, 0x027, (watchdog_s,)),
-        Values("write", FLOAT, 0x02B, (0.0,)),
+        write(INT8, 0, 10),
+        write(FLOAT, 0x020, nan, 0.0, torque_nm, 0.0, 0.0, most_nm),
+        write(FLOAT, 0x027, watchdog_s),
+        write(FLOAT, 0x02B, 0.0),
         *QUERY,
     )
 
 
 def answer(mode: int, state: tuple, volts: float, celsius: int, code: int) -> tuple:
     return (
-        Values("answer", INT8, 0, (mode,)),
-        Values("answer", FLOAT, 1, state),
-        Values("answer", INT8, 0x00D, (round(volts / 0.5), celsius, code)),
+        answered(INT8, 0, mode),
+        answered(FLOAT, 1, *state),
+        answered(INT8, 0x00D, round(volts / 0.5), celsius, code),
     )
 
 
@@ -66,8 +85,8 @@ ORACLES = [
         "01000a0c06200000c07f0000000000000000000000000000000000004041"
         "0d27cdcc4c3d0d2b0000000011001f01130d",
     ),
-    ((Values("write", INT8, 0, (0,)), *QUERY), "01000011001f01130d"),
-    ((Values("write", INT8, 0, (0,)),), "010000"),
+    ((write(INT8, 0, 0), *QUERY), "01000011001f01130d"),
+    ((write(INT8, 0, 0),), "010000"),
     (QUERY, "11001f01130d"),
     (
         answer(10, (0.25, -0.5, 0.8), 24.0, 30, 0),
@@ -88,26 +107,29 @@ ORACLES = [
     # int16 and int8 of the maker's page on the protocol, and what it answers
     (
         (
-            Values("write", INT8, 0, (10,)),
-            Values("write", INT16, 0x020, (96, 288, -176)),
-            Read(INT16, 0, 4),
-            Read(INT8, 0x00D, 3),
+            write(INT8, 0, 10),
+            write(INT16, 0x020, 96, 288, -176),
+            read(INT16, 0, 4),
+            read(INT8, 0x00D, 3),
         ),
         "01000a07206000200150ff140400130d",
     ),
     (
         (
-            Values("answer", INT16, 0, (10, 80, 256, -144)),
-            Values("answer", INT8, 0x00D, (24, 20, 0)),
+            answered(INT16, 0, 10, 80, 256, -144),
+            answered(INT8, 0x00D, 24, 20, 0),
         ),
         "2404000a005000000170ff230d181400",
     ),
     # a register above 127 and what is refused, text of the console
-    ((Read(INT32, 0x101, 2),), "1a8102"),
-    ((Refusal("read", 0x300, 1), Refusal("write", 5, 2)), "31800601300502"),
-    ((Stream("is told", b"tel stop\n"),), "40010974656c2073746f700a"),
-    ((Poll(48),), "420130"),
-    ((Stream("says", b"OK\r\n"),), "4101044f4b0d0a"),
+    ((read(INT32, 0x101, 2),), "1a8102"),
+    (
+        (Subframe(READ_ERROR, 0, 0x300, 1), Subframe(WRITE_ERROR, 0, 5, 2)),
+        "31800601300502",
+    ),
+    ((text(TO_CONSOLE, b"tel stop\n"),), "40010974656c2073746f700a"),
+    ((Subframe(POLL, 0, CONSOLE, 48),), "420130"),
+    ((text(FROM_CONSOLE, b"OK\r\n"),), "4101044f4b0d0a"),
 ]
 
 
@@ -132,7 +154,7 @@ def single(subframes: tuple) -> tuple:
     """The same with floats as they are on the bus."""
     return tuple(
         one._replace(values=struct.unpack(f"{n}f", struct.pack(f"{n}f", *one.values)))
-        if isinstance(one, Values) and one.kind == FLOAT and (n := len(one.values))
+        if one.kind == FLOAT and (n := len(one.values))
         else one
         for one in subframes
     )
@@ -151,15 +173,23 @@ numbers = st.one_of(
 )
 subframes = st.one_of(
     st.builds(
-        lambda act, first, made: Values(act, made[0], first, tuple(made[1])),
-        st.sampled_from(["write", "answer"]),
+        lambda act, first, made: Subframe(
+            act, made[0], first, len(made[1]), tuple(made[1])
+        ),
+        st.sampled_from([WRITE, ANSWER]),
         registers,
         numbers,
     ),
-    st.builds(Read, st.integers(0, 3), registers, st.integers(1, 2**32 - 1)),
-    st.builds(Refusal, st.sampled_from(["write", "read"]), registers, registers),
-    st.builds(Stream, st.sampled_from(["is told", "says"]), st.binary(max_size=20)),
-    st.builds(Poll, registers),
+    st.builds(read, st.integers(0, 3), registers, st.integers(1, 2**32 - 1)),
+    st.builds(
+        lambda act, first, n: Subframe(act, 0, first, n),
+        st.sampled_from([WRITE_ERROR, READ_ERROR, POLL]),
+        registers,
+        registers,
+    ),
+    st.builds(
+        text, st.sampled_from([TO_CONSOLE, FROM_CONSOLE]), st.binary(max_size=20)
+    ),
 )
 
 
@@ -181,14 +211,13 @@ def test_decoding_raises_its_own_error_or_none(data: bytes) -> None:
     ("act", "words"),
     [
         (lambda: decode(b"\x01\x00"), "in the middle of a subframe"),
-        (lambda: decode(b"\x2c\xff\xff\xff\xff\x0f\x00"), "4294967295 registers"),
-        (lambda: decode(b"\x11" + b"\xff" * 6), "a number without an end"),
-        (lambda: decode(b"\x60"), "a subframe 0x60"),
-        (lambda: decode(b"\x41\x02\x00"), "a subframe 0x41"),
-        (lambda: encode([Values("write", INT8, 0, (128,))]), "does not fit its type"),
-        (lambda: encode([Values("write", FLOAT, 0, (1e39,))]), "does not fit its"),
-        (lambda: encode([Read(INT8, -1, 1)]), "needs a number of 32 bits, got -1"),
-        (lambda: encode([Stream("says", bytes(62))]), "at most 64 bytes, got 65"),
+        (lambda: decode(b"\x2c\xff\xff\xff\xff\x0f\x00"), "in the middle of"),
+        (lambda: decode(b"\x11" + b"\xff" * 6), "one without an end"),
+        (lambda: decode(b"\x60"), "a known subframe, got 0x60"),
+        (lambda: encode([write(INT8, 0, 128)]), "does not fit its type"),
+        (lambda: encode([write(FLOAT, 0, 1e39)]), "does not fit its type"),
+        (lambda: encode([read(INT8, -1)]), "needs a number of 32 bits, got -1"),
+        (lambda: encode([text(FROM_CONSOLE, bytes(62))]), "at most 64 bytes, got 65"),
     ],
 )
 def test_what_is_no_frame_or_fits_in_none_is_refused(act, words: str) -> None:
