@@ -10,7 +10,7 @@ from masrel import agreement
 DOCS = Path(__file__).parents[2] / "docs"
 INDEX = DOCS / "reference" / "coefficients" / "index.md"
 PAGES = sorted(set(INDEX.parent.glob("*.md")) - {INDEX})
-INPUT = DOCS / "howto" / "input.md"
+INPUT = DOCS / "reference" / "formats" / "memory.md"
 
 
 @pytest.mark.parametrize("page", [INDEX, INPUT, *PAGES], ids=lambda page: page.stem)

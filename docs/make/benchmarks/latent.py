@@ -1,7 +1,7 @@
 """What the latent-trait model costs.
 
 ``python -m docs.make.benchmarks.latent`` writes its part of
-``docs/howto/latent_trait.md``. Ratings are drawn from the model itself; each study is
+``docs/evidence/latent_trait.md``. Ratings are drawn from the model itself; each study is
 sampled once, under one prior.
 """
 
@@ -89,7 +89,7 @@ def main() -> None:
         "|---|---|---|---|---|---|",
         *map(measure, STUDIES),
     ]
-    write_part(DOCS / "howto/latent_trait.md", "costs", lines)
+    write_part(DOCS / "evidence/latent_trait.md", "costs", lines)
 
 
 if __name__ == "__main__":
