@@ -1,8 +1,8 @@
 """What the latent-trait model costs.
 
 ``python -m docs.make.benchmarks.latent`` writes its part of
-``docs/evidence/latent_trait.md``. Ratings are drawn from the model itself; each study is
-sampled once, under one prior.
+``docs/evidence/latent_trait.md``. Ratings are drawn from the model itself; each study
+is sampled once, under one prior.
 """
 
 import time
