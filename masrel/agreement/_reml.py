@@ -17,7 +17,6 @@ from masrel.agreement._effects import Cells
 from masrel.agreement._engine import Floats
 
 _HIGHEST = 1e3  # √ratio of effects beside which there is as good as no residual
-_NONE = 1e-3  # √ratio of a variance that no ratings tell from 0
 _STEP = 1e-4
 _AT_ONCE = 2e7  # numbers in columns that are solved for together
 _EXACT = 1000  # levels up to which traces are exact; of more, by random signs
@@ -48,8 +47,20 @@ def components(
     theta = np.abs(search.x)
     if (theta > 0.9 * _HIGHEST).any():
         return None
-    theta[theta < _NONE] = 0.0  # where the slope is 0, whatever the others are
-    return equations.components(np.abs(root(slopes, theta, tol=1e-7).x))
+    # a search nears 0 and never meets it, where the slope is 0 whatever the others are
+    for at in np.eye(len(theta), dtype=bool):
+        without = np.where(at, 0.0, theta)
+        if equations.deviance(without) <= equations.deviance(theta):
+            theta = without
+    free = theta > 0.0
+
+    def slopes_of(some: Floats) -> Floats:
+        theta[free] = some
+        return slopes(theta)[free]
+
+    if free.any():
+        theta[free] = np.abs(root(slopes_of, theta[free], tol=1e-7).x)
+    return equations.components(theta)
 
 
 class _Equations:

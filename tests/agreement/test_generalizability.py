@@ -5,6 +5,7 @@ import math
 from fractions import Fraction
 from itertools import chain, combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,6 +22,7 @@ from masrel.errors import UndefinedStatisticWarning
 
 ORACLE = Path(__file__).parents[1] / "oracles" / "generalizability.json"
 DATASETS = json.loads(ORACLE.read_text(encoding="utf-8"))["datasets"]
+LME4 = json.loads(ORACLE.with_name("lme4.json").read_text(encoding="utf-8"))
 
 # Sizes by column, the first measured, and what is nested; "again": several of a cell
 DESIGNS = [
@@ -247,6 +249,18 @@ class TestGaps:
         expected = {columns[name]: part for name, part in expected.items()}
         expected["residual"] = fit.scale
         assert study.components == pytest.approx(expected, rel=1e-5)
+
+    @pytest.mark.parametrize("design", LME4["designs"], ids=lambda of: of["name"])
+    def test_reml_is_that_of_lme4(self, design: dict[str, Any]):
+        frame = pd.DataFrame(design["rows"], columns=design["columns"])
+        study = g_study(
+            frame, of="person", facets=design["facets"], nested=design["nested"]
+        )
+        assert study.method == "REML"
+        assert study.components == pytest.approx(design["components"], rel=1e-5)
+        # what lme4 has at 0 is 0, and no number near it that differs from run to run
+        zeros = [source for source, part in design["components"].items() if not part]
+        assert all(study.components[source] == 0.0 for source in zeros)
 
     def test_one_gap_changes_little(self):
         # of a balanced design REML is its mean squares, components being above 0
