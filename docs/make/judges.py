@@ -1,4 +1,4 @@
-"""The figures of docs/howto/judges.md, of the files that the page makes.
+"""The figures of two pages of docs/howto, judges and preferences, of files they make.
 
 ``python -m docs.make.judges`` draws them.
 """
@@ -23,8 +23,9 @@ CALLS = {
 
 def draw() -> None:
     """Write the files of the blocks of Python, and draw what is shown of them."""
-    page = (ROOT / "docs/howto/judges.md").read_text(encoding="utf-8")
-    blocks = (of for of in read(page) if of.language == "python")
+    pages = (ROOT / f"docs/howto/{name}.md" for name in ("judges", "preferences"))
+    blocks = (of for page in pages for of in read(page.read_text("utf-8")))
+    blocks = (of for of in blocks if of.language == "python")
     lines = ["\n".join(of.lines) for of in blocks if ".csv" in "".join(of.lines)]
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for made in lines:
