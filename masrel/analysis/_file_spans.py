@@ -20,8 +20,10 @@ def span_answer(
     documents, observers = ({row[k] for row in rows} for k in (0, 1))
     n_absent = len(documents) * len(observers) - len({row[:2] for row in rows})
     is_known = documents <= lengths.keys()
+    names = ("document", "observer", "category", "begin", "length")
+    spans = dict(zip(names, zip(*rows, strict=True), strict=False))
     with warnings.catch_warnings(action="ignore", category=MasrelWarning):
-        alpha = is_known and unitizing_alpha(rows, length=lengths, level=level)
+        alpha = is_known and unitizing_alpha(spans, length=lengths, level=level)
         estimates = [
             *(
                 ("Unitizing α", *of)
@@ -30,7 +32,7 @@ def span_answer(
             *(
                 (f"F1, {match}", " and ".join(map(str, of)), estimate)
                 for match in get_args(SpanMatch)
-                for of, estimate in span_f1(rows, match=match, level=level).items()
+                for of, estimate in span_f1(spans, match=match, level=level).items()
             ),
         ]
     n_spans = sum(label is not None for _, _, label, *_ in rows)

@@ -9,6 +9,7 @@ the texts of all that is refused or warned of.
 """
 
 import hashlib
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -847,24 +848,31 @@ def read_spans(
     """Return rows of spans, known lengths of documents, and the largest rounding."""
     # columns: what those of a table are called, by their role; step: what places are
     # counted in and rounded to; -> rows of document, observer, label, begin, length
-    steps = cache(lambda text: Fraction(text) / Fraction(str(step or 1)))
-    rows, lengths, off = list[tuple[Any, ...]](), Counter[str](), Fraction()
+    rows, lengths, off = list[tuple[Any, ...]](), Counter[str](), 0.0
     annotations = _spans(path, options, columns)
+
+    @cache
+    def placed(text: str) -> tuple[int, int, float]:
+        """Return the nearest step, the next one, and how far off the nearest is."""
+        exact = Fraction(text) / Fraction(str(step or 1))
+        return round(exact), math.ceil(exact), float(abs(exact - round(exact)))
+
     try:
         for of in annotations:
             document, span = str(of.item), of.grades
             text = of.text if step is None and isinstance(of.text, str) else ""
-            length = -(-steps(str(span.get("length") or len(text))) // 1)
+            length = placed(str(span.get("length") or len(text)))[1]
             lengths[document] = max(lengths[document], length)
-            exact = [steps(str(span.get(end, 0))) for end in ("begin", "end")]
-            off = max(off, *(abs(place - round(place)) for place in exact))
-            who, (begin, end) = (document, str(of.rater)), map(round, exact)
-            rows.append((*who, span.get("label"), begin, end - begin))
+            begin, _, off_begin = placed(str(span.get("begin", 0)))
+            end, _, off_end = placed(str(span.get("end", 0)))
+            off = max(off, off_begin, off_end)
+            row = document, str(of.rater), span.get("label"), begin, end - begin
+            rows.append(row)
     except (TypeError, AttributeError, LookupError, ValueError) as error:
         raise refusal(str(path), "no spans", error=error) from error
     if step is None and off:
         raise refusal(str(path), "no step")
-    return rows, {of: n for of, n in lengths.items() if n}, float(off)
+    return rows, {of: n for of, n in lengths.items() if n}, off
 
 
 def _spans(
