@@ -35,7 +35,7 @@ STATISTICS = (
 )
 LABORATORY = (
     *("protocol", "schedule", "run", "recording", "elbow", "elbow.tone"),
-    *("elbow.identification", "hess", "hess.puck", "ratings"),
+    *("elbow.identification", "hess", "hess.puck", "hess.moteus", "ratings"),
 )
 HOMES = [
     *(f"masrel.{name}" for name in STATISTICS),

@@ -150,9 +150,6 @@ def _device_command(function: Callable[..., None]) -> Callable[..., None]:
         output: OutputOptions,
         **kwargs: Any,
     ) -> None:
-        hand = SimulatedHand(
-            start=_EMULATED_START, end=_RANGE_END, mean_speed=1.0, slip_time=0.0
-        )
         settings: dict[str, Any] = {
             "interface": interface or ("virtual" if emulate else "socketcan"),
             "channel": channel,
@@ -171,12 +168,18 @@ def _device_command(function: Callable[..., None]) -> Callable[..., None]:
             name=name,
             options=options.emulated(_EMULATED_START) if emulate else options,
             clock=SimulatedClock() if emulate else RealClock(),
-            hand=hand if emulate else None,
+            hand=_free_hand() if emulate else None,
             output=output,
         )
         function(session, **kwargs)
 
     return _device_options(command)
+
+
+def _free_hand() -> SimulatedHand:
+    return SimulatedHand(
+        start=_EMULATED_START, end=_RANGE_END, mean_speed=1.0, slip_time=0.0
+    )
 
 
 @click.group("device", cls=Commands)
@@ -254,6 +257,27 @@ def _zero(session: _Session, angle_deg: float) -> None:
         [f"the arm is at {angle_deg:g} deg: {position:.8g} {unit}"],
         {"angle_deg": angle_deg, unit: position},
     )
+
+
+@device.command("emulate")
+@_device_command
+def _emulate(session: _Session) -> None:
+    """Be an amplifier for other processes, until Ctrl-C.
+
+    The bus is one that processes of this machine share: udp_multicast, or a vcan of
+    SocketCAN. The arm is free, at 60 deg.
+    """
+    options, stop = session.options, EmergencyStop()
+    if options.moves_hardware or not options.is_shared:
+        raise click.UsageError("needs --interface udp_multicast, or a channel vcan0")
+    with (
+        session.backend.connected(
+            options, clock=RealClock(), hand=_free_hand(), range_end=_RANGE_END
+        ) as link,
+        stop_on_signals(stop),
+    ):
+        click.echo(f"an emulated {session.name} is on {options.channel}")
+        link.peer.run(lambda: stop.reason is not None)
 
 
 @device.command("friction")

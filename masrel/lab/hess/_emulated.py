@@ -18,6 +18,7 @@ from masrel.lab.hess._simulated import Plant, PlantParameters
 from masrel.lab.hess.hand import Hand
 
 _DUPLICATE_NS = 100_000
+_SOON_NS = 10_000_000  # until it is looked whether it is over
 _BRAKING_STEP_NS = 500_000
 _PROTOCOL_ERROR = 0x088  # class of an error frame: protocol violation, bus error
 
@@ -251,6 +252,15 @@ class EmulatedAmplifier(ABC):
         while (frame := self.link.receive(0)) is not None:
             self._take_in(frame, self._clock.now_ns())
         self._act(self._clock.now_ns())
+
+    def run(self, is_over: Callable[[], bool]) -> None:
+        """Serve a bus that other processes are on, in real time."""
+        while not is_over():
+            soon_ns = self._clock.now_ns() + _SOON_NS
+            frame = self.link.receive(min(self.next_due_ns() or soon_ns, soon_ns))
+            if frame is not None:
+                self._take_in(frame, self._clock.now_ns())
+            self._act(self._clock.now_ns())
 
     def close(self) -> None:
         """Leave the bus."""

@@ -135,3 +135,37 @@ def test_what_cannot_be_done_is_said_in_one_line(
     assert done.code == code
     assert words in done.err
     assert "Traceback" not in done.err
+
+
+MOTEUS = ("--device", "moteus", "--channel", "cli-moteus", "--emulate")
+
+
+def test_a_moteus_is_brought_up_by_the_same_commands(masrel: Caller) -> None:
+    done = masrel("device", "probe", *MOTEUS, "--node", 7)
+    assert done.out.startswith("moteus 7: firmware 1.0.0, 24 V, 30 deg C\n")
+    done = masrel("device", "check", *MOTEUS)
+    assert done.code == 0
+    looked = [line.split(":")[0] for line in done.out.splitlines()[:-1]]
+    names = ("settings", "answers", "position", "rest", "torque mode", "error frames")
+    assert looked == [f"ok   {name}" for name in names]
+    done = masrel("device", "zero", "--angle-deg", 90, *MOTEUS, "--json", "-")
+    document = json.loads(done.out)
+    assert document.pop("format") == "masrel device zero 1"
+    assert document == {"angle_deg": 90.0, "turns": 0.25, "simulated": True}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("check", *MOTEUS, "--node", 128), "servo: needs 1 to 127, got 128"),
+        (("check", *MOTEUS, "--properties", __file__), "--properties is for a puck"),
+        (("emulate", "--device", "moteus"), "needs --interface udp_multicast"),
+        (("emulate", *MOTEUS), "needs --interface udp_multicast"),
+    ],
+)
+def test_what_a_moteus_cannot_be_told_is_refused(
+    masrel: Caller, arguments: tuple, words: str
+) -> None:
+    done = masrel("device", *arguments)
+    assert done.code == 2
+    assert words in done.err

@@ -165,7 +165,7 @@ def check(link: Link, clock: Clock, options: MoteusOptions) -> tuple[Check, ...]
 
     def angle() -> float:
         servo.ask()
-        return options.angle(servo.answer(_TICK_S).position)
+        return options.angle(servo.answer(options.patience_s).position)
 
     answers, angles = ask_often(servo, angle)
     steps = [round(angle / _STEP) for angle in angles]

@@ -82,18 +82,13 @@ _ANSWERED = 0x8000  # in an identifier: the host, number 0, wants an answer
 
 _SAMPLING_NS = 140_000  # from a question to the sample: own estimate for 64 bytes
 _PATIENCE_S = 0.02  # outside the loop
-_CONSOLE_NS, _POLL_NS = 50_000_000, 2_000_000  # for text, for a part of it
+_CONSOLE_NS, _POLL_NS = 200_000_000, 2_000_000  # for text, for a part of it
 _CONSOLE_BYTES = 48
 
-# What the counter of an answer may lag behind the host's clock, ms, and over how long
-# a time the two are compared: the controller's clock may be 1 % off
-_MOST_LAG = 2
-_COMPARED_NS = 100_000_000
-
+_COMPARED_NS = 100_000_000  # for how long two counts of milliseconds are: they wrap
 
 _RECENT_NS = 1_500_000  # since a torque: then its answer is still of this tick
-_TICK_S = 0.001  # for a question in the loop
-_LATE_S = 0.0015  # for the answer to a torque, of which a tick has passed
+_LATE_S = 0.0005  # more than its patience, of which a tick has passed
 _PREPARING_NS = 50_000_000  # from a stop to the first torque; chosen
 
 _MAX_LIMITED = 2  # answers in a row that say that something limits the torque
@@ -173,9 +168,8 @@ class Servo(Node):
         if count is None or self._accepted is None:
             return count is not None
         asked_ns, count_then = self._accepted
-        passed_ns = self.asked_ns - asked_ns
-        lag = round(passed_ns * 1e-6) - (int(count) - count_then)
-        if passed_ns < _COMPARED_NS and (lag + 128) % 256 - 128 > _MOST_LAG:
+        count_on = (int(count) - count_then + 128) % 256 - 128
+        if count_on < 0 and self.asked_ns - asked_ns < _COMPARED_NS:
             self._answer = {}
         return bool(self._answer)
 
@@ -183,13 +177,15 @@ class Servo(Node):
 
     def stop(self) -> State:
         """Stop it, which also clears a fault and its timeout, until it confirms."""
-        self.insist(self._stops, "IF THE ARM IS NOT FREE, SWITCH ITS SUPPLY OFF")
-        self.ask()
-        return self.answer()
+        states: list[State] = []
 
-    def _stops(self, _since_s: float) -> bool:
-        self.ask(_STOP)
-        return self.answer().mode == STOPPED
+        def attempt(_since_s: float) -> bool:
+            self.ask(_STOP)
+            states.append(self.answer())
+            return states[-1].mode == STOPPED
+
+        self.insist(attempt, "IF THE ARM IS NOT FREE, SWITCH ITS SUPPLY OFF")
+        return states[-1]
 
     def get(
         self, kind: int, first: int, n: int = 1, *, patience_s: float = _PATIENCE_S
@@ -332,7 +328,7 @@ class MoteusDevice(CanDevice[MoteusOptions]):
         servo = self._servo
         silent_ns = self._setup.clock.now_ns() - servo.asked_ns
         if servo.is_asked and silent_ns <= _RECENT_NS:
-            return servo.answer(_LATE_S)
+            return servo.answer(self._options.patience_s + _LATE_S)
         if self._driven_ns and silent_ns > self._options.watchdog_ms * 1e6:
             # It has let go, and obeys nothing until it is stopped
             if self._commanded[-1] != 0.0:
@@ -340,7 +336,7 @@ class MoteusDevice(CanDevice[MoteusOptions]):
             self._driven_ns = None
             return servo.stop()
         servo.ask()
-        return servo.answer(_TICK_S)
+        return servo.answer(self._options.patience_s)
 
     def _timed_out(self) -> IdledError:
         return IdledError(

@@ -127,6 +127,8 @@ class MoteusOptions(BusOptions):
         refused before they are sent.
     watchdog_ms : float
         After so long a silence it lets go by itself.
+    patience_s : float
+        How long to wait for an answer, s: one period of the loop.
     emulator : MoteusEmulatorOptions or None
         For an emulated moteus on a bus inside this process: what it is like.
 
@@ -145,13 +147,16 @@ class MoteusOptions(BusOptions):
     zero_rev: float = 0.0
     largest_torque_nm: float = 20.0
     watchdog_ms: float = 20.0
+    patience_s: float = 0.001
     emulator: MoteusEmulatorOptions | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.servo <= 127:
             raise ParameterError(f"servo: needs 1 to 127, got {self.servo}")
         _check_positive(
-            gear_ratio=self.gear_ratio, largest_torque_nm=self.largest_torque_nm
+            gear_ratio=self.gear_ratio,
+            largest_torque_nm=self.largest_torque_nm,
+            patience_s=self.patience_s,
         )
         check_direction(self.direction)
         if not math.isfinite(self.zero_rev):
