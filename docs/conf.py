@@ -12,17 +12,15 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from functools import cache
+from importlib.util import find_spec
 from itertools import pairwise
 from os.path import normpath, relpath
 from pathlib import Path
 from typing import Any
 
-from docutils import nodes
-from docutils.utils.math import latex2mathml
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.util.logging import getLogger
-from sphinx.writers.html5 import HTML5Translator
 
 import masrel
 
@@ -41,6 +39,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
     "sphinx_click",
     "sphinx_copybutton",
 ]
@@ -55,7 +54,9 @@ suppress_warnings = ["misc.highlighting_failure"]  # output of commands is no la
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
-html_math_renderer = "mathml"  # which browsers draw themselves, without a network
+# MathJax as one file with its letters, so that formulas need no network
+_MATHJAX = Path(str(find_spec("sphinx-mathjax-offline").origin)).parent
+mathjax_path = "tex-svg.js"
 
 numpydoc_show_class_members = False
 autosummary_ignore_module_all = False
@@ -66,17 +67,21 @@ default_role = "literal"  # as docstrings use one backtick
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"masrel {version}"
-html_static_path = ["_static"]
+html_static_path = ["_static", f"{_MATHJAX}/static/mathjax/{mathjax_path}"]
 html_favicon = html_logo = "_static/icon.svg"
 html_baseurl = _META["urls"]["Documentation"] if _HAS_ADDRESS else ""
 html_extra_path = ["robots.txt"]
 html_show_sourcelink = False
+html_css_files = ["site.css"]
+html_search_scorer = str(DOCS / "_static/scorer.js")
 html_theme_options: dict[str, Any] = {
     "check_switcher": False,
     "header_links_before_dropdown": 8,
     "logo": {"text": project},
+    "footer_end": ["version-switcher"],
+    "navbar_align": "left",
+    "navbar_end": ["theme-switcher"],
     "navbar_persistent": ["search-button"],
-    "navbar_end": ["version-switcher", "theme-switcher", "navbar-icon-links"],
     "switcher": {
         "json_url": f"{html_baseurl}_static/switcher.json",
         "version_match": "dev" if "dev" in version else version,
@@ -129,7 +134,6 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", _read)
     app.connect("autodoc-process-docstring", _of_constant)
     app.connect("env-check-consistency", _check)
-    app.add_html_math_renderer("mathml", (_math, None), (_displayed, None))
 
 
 def _read(app: Sphinx, name: str, source: list[str]) -> None:
@@ -182,16 +186,6 @@ def _index_of(page: Path) -> Path:
     while not (folder / "index.md").exists():
         folder = folder.parent
     return folder / "index.md"
-
-
-def _math(translator: HTML5Translator, node: nodes.math) -> None:
-    translator.body.append(latex2mathml.tex2mathml(node.astext(), as_block=False))
-    raise nodes.SkipNode
-
-
-def _displayed(translator: HTML5Translator, node: nodes.math_block) -> None:
-    translator.body.append(latex2mathml.tex2mathml(node.astext(), as_block=True))
-    raise nodes.SkipNode
 
 
 def _check(app: Sphinx, env: BuildEnvironment) -> None:

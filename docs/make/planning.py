@@ -1,25 +1,25 @@
-"""The page of what came true of plans: ``python -m docs.make.planning``.
+"""The rows of what came true of plans: ``python -m docs.make.planning``.
 
-Writes ``docs/evidence/planning.md`` and ``docs/figures/planning_error.png``: designs
+Writes ``docs/evidence/planning_*.csv`` and ``docs/figures/planning_error.png``: designs
 that were planned and then simulated anew with another seed, formulas beside them,
 presize and kappaSize beside, and how Monte Carlo error falls with time.
 """
 
 import json
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from docs.make.evidence import FIGURES, write_rows
 from masrel.planning import LatentModel, Plan, Study, precision, sample_size
 from masrel.planning._studies import numbers_of, simulated
 from masrel.planning._truth import design_of
 
-DOCS = Path(__file__).parents[1]
-PAGE = DOCS / "evidence" / "planning.md"
-FIGURE = DOCS / "figures" / "planning_error.png"
-ORACLE = DOCS.parent / "tests" / "oracles" / "planning.json"
+FIGURE = FIGURES / "planning_error.png"
+ORACLE = Path(__file__).parents[2] / "tests" / "oracles" / "planning.json"
 TWO, THREE, FOUR = [0.7, 0.3], [0.5, 0.3, 0.2], [0.4, 0.3, 0.2, 0.1]
 
 
@@ -85,41 +85,34 @@ def number_of(design: dict[str, Any]) -> str:
     return named[0] if named else "expected_half_width"
 
 
-def _designs(n_studies: int) -> list[str]:
-    lines = [
-        "| coefficient | model | raters | aim | items | planned | came true | method |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+def _of(design: dict[str, Any]) -> dict[str, object]:
+    keys = ("coefficient", "weights", "model", "n_raters")
+    return {key: design.get(key, "identity") for key in keys}
+
+
+def _designs(n_studies: int) -> Iterator[dict[str, object]]:
     for design in DESIGNS:
-        plan = sample_size(Study(**design))
+        plan, name = sample_size(Study(**design)), number_of(design)
         numbers, _ = came_true(design, plan, n_studies)
-        name = number_of(design)
-        lines.append(
-            f"| {design['coefficient']} {design.get('weights', '')} "
-            f"| {design['model']} | {plan.n_raters} | {_aim(design)} | {plan.n_items} "
-            f"| {getattr(plan, name):.4f} | {numbers[name]:.4f} "
-            f"| {plan.method} |"
-        )
-        print(lines[-1], flush=True)
-    return lines
+        yield _of(design) | {
+            "aim": _aim(design),
+            "n_items": plan.n_items,
+            "planned": getattr(plan, name),
+            "came_true": numbers[name],
+            "method": plan.method,
+        }
 
 
-def _formulas(n_studies: int) -> list[str]:
-    lines = [
-        "| coefficient | model | raters | wanted | items by formula | came true "
-        "| studies that reach it |",
-        "|---|---|---|---|---|---|---|",
-    ]
+def _formulas(n_studies: int) -> Iterator[dict[str, object]]:
     for design in DESIGNS[:14]:
         plan = sample_size(Study(**{**design, "method": "wald"}))
         numbers, _ = came_true(design, plan, n_studies)
-        half, reached = numbers["expected_half_width"], numbers["assurance"]
-        lines.append(
-            f"| {design['coefficient']} {design.get('weights', '')} "
-            f"| {design['model']} | {plan.n_raters} | {design['half_width']} "
-            f"| {plan.n_items} | {half:.4f} | {100 * reached:.0f} % |"
-        )
-    return lines
+        yield _of(design) | {
+            "half_width": design["half_width"],
+            "n_items": plan.n_items,
+            "came_true": numbers["expected_half_width"],
+            "reached": numbers["assurance"],
+        }
 
 
 def _aim(design: dict[str, Any]) -> str:
@@ -127,92 +120,90 @@ def _aim(design: dict[str, Any]) -> str:
     return ", ".join(f"{key} {design[key]}" for key in keys if key in design)
 
 
-def _packages() -> list[str]:
+def _by_formula(kappa: float, **design: Any) -> int | None:
+    study = Study(
+        "fleiss_kappa",
+        value=kappa,
+        target="items",
+        method="goodness-of-fit",
+        **design,
+    )
+    return sample_size(study).n_items
+
+
+def _packages() -> Iterator[dict[str, object]]:
     oracle = json.loads(ORACLE.read_text("utf-8"))
-    lines = [
-        "| κ | raters | categories | limits | masrel | kappaSize 1.2 |",
-        "|---|---|---|---|---|---|",
-    ]
     for setting in oracle["settings"]:
         if setting["kind"] != "gof_n":
             continue
         at = setting["design"]
-        three = at["n_categories"] > 2 and at["n_raters"] > 2
-        plan = sample_size(
-            Study(
-                "fleiss_kappa",
-                value=at["kappa"],
-                n_raters=at["n_raters"],
-                prevalences=at["prevalences"],
-                model=_DM if three else "mixture",
-                target="items",
-                level=at["level"],
-                sides=at["sides"],
-                lower=at["kappa_lower"],
-                upper=at["kappa_upper"],
-                method="goodness-of-fit",
-            )
+        low, high = at["kappa_lower"], at["kappa_upper"]
+        n = _by_formula(
+            at["kappa"],
+            n_raters=at["n_raters"],
+            prevalences=at["prevalences"],
+            model=_DM if at["n_categories"] > 2 and at["n_raters"] > 2 else "mixture",
+            level=at["level"],
+            sides=at["sides"],
+            lower=low,
+            upper=high,
         )
-        printed = setting.get("package", {}).get("n")
-        limits = f"{at['kappa_lower']} to {at['kappa_upper'] or '…'}"
-        lines.append(
-            f"| {at['kappa']} | {at['n_raters']} | {at['n_categories']} | {limits} "
-            f"| {plan.n_items} | {printed or '–'} |"
-        )
-    lines += [
-        "",
-        "| κ | raters | width | masrel | presize 0.3.9 |",
-        "|---|---|---|---|---|",
-    ]
+        yield {
+            "package": "kappaSize 1.2",
+            "kappa": at["kappa"],
+            "n_raters": at["n_raters"],
+            "n_categories": at["n_categories"],
+            "aim": f"{low} to {high or '…'}",
+            "masrel": n,
+            "theirs": setting.get("package", {}).get("n", ""),
+        }
     for case in oracle["presize"]:
-        if "width" in case:
-            plan = sample_size(
-                Study(
-                    "fleiss_kappa",
-                    value=case["kappa"],
-                    n_raters=case["raters"],
-                    prevalences=[1 - case["prevalence"], case["prevalence"]],
-                    model="mixture",
-                    target="items",
-                    half_width=case["width"] / 2,
-                    method="goodness-of-fit",
-                )
-            )
-            lines.append(
-                f"| {case['kappa']} | {case['raters']} | {case['width']} "
-                f"| {plan.n_items} | {case['presize']} |"
-            )
-    return lines
+        if "width" not in case:
+            continue
+        n = _by_formula(
+            case["kappa"],
+            n_raters=case["raters"],
+            prevalences=[1 - case["prevalence"], case["prevalence"]],
+            model="mixture",
+            half_width=case["width"] / 2,
+        )
+        yield {
+            "package": "presize 0.3.9",
+            "kappa": case["kappa"],
+            "n_raters": case["raters"],
+            "n_categories": 2,
+            "aim": f"width {case['width']}",
+            "masrel": n,
+            "theirs": case["presize"],
+        }
 
 
-def _paper() -> list[str]:
-    lines = [
-        "| model | interval for other | half-width | low | high | coverage |",
-        "|---|---|---|---|---|---|",
-    ]
+def _paper() -> Iterator[dict[str, object]]:
     models: dict[str, Any] = {"mixture": "mixture", _DM: _DM}
     models["latent, the same four items"] = _same_items(0.626)
     for name, model in models.items():
+        is_latent = isinstance(model, LatentModel)
         for target in ("raters", "items"):
-            plan = precision(
-                Study(
-                    "fleiss_kappa",
-                    value=None if isinstance(model, LatentModel) else 0.626,
-                    categories=None if isinstance(model, LatentModel) else 6,
-                    model=model,
-                    target=target,  # type: ignore[arg-type]
-                    n_items=4,
-                    n_raters=8,
-                    rng=1,
-                )
+            study = Study(
+                "fleiss_kappa",
+                value=None if is_latent else 0.626,
+                categories=None if is_latent else 6,
+                model=model,
+                target=target,  # type: ignore[arg-type]
+                n_items=4,
+                n_raters=8,
+                rng=1,
             )
-            lines.append(
-                f"| {name} | {target} | {plan.expected_half_width:.3f} "
-                f"± {plan.monte_carlo_error:.3f} | {plan.expected_low:.3f} "
-                f"| {plan.expected_high:.3f} | {plan.coverage:.2f} |"
-            )
-            print(lines[-1], flush=True)
-    return lines
+            plan = precision(study)
+            yield {
+                "model": name,
+                "target": target,
+                "half_width": plan.expected_half_width,
+                "monte_carlo_error": plan.monte_carlo_error,
+                "low": plan.expected_low,
+                "high": plan.expected_high,
+                "coverage": plan.coverage,
+            }
 
 
 def _same_items(value: float) -> LatentModel:
@@ -281,60 +272,12 @@ def _error_figure() -> None:
 
 
 def main() -> None:
-    """Write the page and its figure."""
+    """Write the rows and the figure."""
     _error_figure()
-    PAGE.write_text(
-        "\n".join(
-            [
-                "# What came true of plans",
-                "",
-                "Made by `python -m docs.make.planning`. "
-                "[Planning](../howto/planning.md) says "
-                "what each thing is.",
-                "",
-                "## Twenty designs",
-                "",
-                "Planned, then simulated in 100 000 studies with another seed; the "
-                "interval is estimate ± t times standard error.",
-                "",
-                *_designs(100_000),
-                "",
-                "## Sizes by formula",
-                "",
-                "The same widths by the Wald formula: what 100 000 studies of that "
-                "size have on average, and how many reach what was wanted.",
-                "",
-                *_formulas(100_000),
-                "",
-                "## presize and kappaSize beside",
-                "",
-                "kappaSize's sizes are those of the goodness-of-fit formula. presize "
-                "hands it the wrong alpha: its 95 % is 90 %.",
-                "",
-                *_packages(),
-                "",
-                "## The design of Park, Kim and Damiano: 4 models × 8 raters",
-                "",
-                "Six grades, κ .626 as in the paper: what the interval of an analysis "
-                "could be expected to be. The ratings themselves give 0.320 to 0.933 "
-                "for other raters, a half-width of 0.307.",
-                "",
-                *_paper(),
-                "",
-                "An interval for other raters is about the same items. Two of the "
-                "models draw items anew in every study, so that with four of them it "
-                "seldom holds the κ of all items; where all have the same four, it "
-                "covers.",
-                "",
-                "## Time and error",
-                "",
-                "![Monte Carlo error over processor time]"
-                "(../figures/planning_error.png)",
-                "",
-            ]
-        ),
-        encoding="utf-8",
-    )
+    write_rows("planning_designs", list(_designs(100_000)))
+    write_rows("planning_formulas", list(_formulas(100_000)))
+    write_rows("planning_packages", list(_packages()))
+    write_rows("planning_hess2012", list(_paper()))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """masrel and other packages beside exact fractions: how far is each number off?
 
-``python -m docs.make.accuracy [--quiet]`` runs the cases of ``cases.py``, which
-takes some minutes, and writes ``docs/evidence/accuracy.md`` and its figure. Packages
-that are not installed are left out.
+``python -m docs.make.accuracy [--quiet]`` runs the cases of ``tests/accuracy``, which
+takes some minutes, and writes ``accuracy.csv``, a part of ``accuracy.md`` in
+``docs/evidence``, and the figure. Packages that are not installed are left out.
 """
 
 import argparse
@@ -10,21 +10,18 @@ import math
 import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import mpmath
 from tqdm import tqdm
 
 import masrel
-from docs.make.accuracy import elbow
 from docs.make.accuracy.peers import PACKAGES, Answer, ask, installed, offers_errors
+from docs.make.evidence import EVIDENCE, FIGURES, write_part, write_rows
 from tests.accuracy.cases import CASES, METRICS, Case
 from tests.accuracy.exactness import relative
 from tests.accuracy.reference import units_off
 from tests.accuracy.scenes import Exact, estimate, exact, prepared
-
-DOCS = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True)
@@ -151,16 +148,14 @@ def main() -> None:
             bar.set_postfix_str(case.name)
             lines.append(compare(case, coefficient, weights, list(packages)))
     from docs.make.accuracy.figure import draw
-    from docs.make.accuracy.page import page
+    from docs.make.accuracy.page import rows, summary
 
     versions = {"masrel": masrel.__version__, **packages}
     versions |= installed(["numpy", "scipy", "pandas", "mpmath"])
     versions["Python"] = platform.python_version()
-    draw(lines, DOCS / "figures" / "accuracy.png")
-    path = DOCS / "evidence/accuracy.md"  # its last section is written by elbow.py
-    path.write_text(
-        page(lines, versions) + elbow.written_section(path), encoding="utf-8"
-    )
+    draw(lines, FIGURES / "accuracy.png")
+    write_rows("accuracy", list(rows(lines)))
+    write_part(EVIDENCE / "accuracy.md", "numbers", summary(lines, versions))
 
 
 if __name__ == "__main__":

@@ -6,17 +6,14 @@ run, turn by turn.
 """
 
 import argparse
-import platform
 import warnings
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-import masrel
 from masrel.agreement import (
     code_long,
     cohen_kappa,
@@ -28,7 +25,6 @@ from masrel.agreement import (
 from tests.benchmarks.peers import PEERS, Codes, made, present, sklearn_cohen
 from tests.benchmarks.sidebyside import Timing, peak_megabytes, side_by_side
 
-DOCS = Path(__file__).parents[2]
 SIZES = ((4, 8), (100, 5), (10_000, 5), (1_000_000, 5), (10_000_000, 3))
 WITH_ERRORS = "masrel, with errors"
 THREE = (fleiss_kappa, gwet_ac, krippendorff_alpha)
@@ -217,19 +213,11 @@ def main() -> None:
     if quick:
         return
     from docs.make.benchmarks.page import draw_errors, draw_times, write_page
+    from docs.make.evidence import FIGURES
 
-    draw_times(lines, DOCS / "figures" / "benchmark_time.png")
-    draw_errors(points, DOCS / "figures" / "benchmark_error.png")
-    versions = present([*PEERS, "scikit-learn", "numpy", "pandas"])
-    machine = f"{platform.machine()}, Python {platform.python_version()}"
-    write_page(
-        DOCS / "evidence/benchmarks.md",
-        lines,
-        more,
-        megabytes,
-        {"masrel": masrel.__version__, **versions},
-        machine,
-    )
+    draw_times(lines, FIGURES / "benchmark_time.png")
+    draw_errors(points, FIGURES / "benchmark_error.png")
+    write_page(lines, more, megabytes)
 
 
 if __name__ == "__main__":

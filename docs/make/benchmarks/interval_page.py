@@ -1,42 +1,26 @@
-"""The part of the page of benchmarks that is of intervals."""
+"""Benchmarks of intervals as rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from docs.make.benchmarks.parts import write_part
+from docs.make.evidence import write_tables
 from tests.benchmarks.bootstrap import OURS, Comparison
 from tests.benchmarks.sidebyside import Timing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """All that the part tells."""
+    """All that is measured."""
 
     comparisons: Sequence[Comparison]
     exact: Sequence[tuple[str, str, Timing]]
     megabytes: Mapping[str, float]
 
 
-def write_page(
-    path: Path, results: Results, versions: Mapping[str, str], machine: str
-) -> None:
-    """Write the part in Markdown."""
-    text = [
-        "## Intervals",
-        "",
-        "`python -m docs.make.benchmarks.intervals` repeats this part: in turn in one "
-        "run, medians; ± is the relative half-distance",
-        "of the quartiles. Times are processor seconds of one thread, so that other "
-        "load counts less; ratios are peer over masrel.",
-        "",
-        f"{machine}; " + ", ".join(f"{k} {v}" for k, v in versions.items()) + ".",
-        "",
-        *_bootstrap(results),
-        *_exact(results),
-        *_memory(results),
-    ]
-    write_part(path, "intervals", text)
+def write_page(results: Results) -> None:
+    """Write the rows."""
+    lines = [*_bootstrap(results), *_exact(results), *_memory(results)]
+    write_tables(["bootstrap", "exact_bootstrap", "bootstrap_memory"], lines)
 
 
 def _bootstrap(results: Results) -> list[str]:
@@ -44,12 +28,6 @@ def _bootstrap(results: Results) -> list[str]:
         dict.fromkeys(peer for line in results.comparisons for peer in line.ratios())
     )
     text = [
-        "### Bootstrap, 10 000 resamples drawn",
-        "",
-        "A percentile interval of items, from ratings, drawn. "
-        "`scipy.stats.bootstrap` is given counts, and calls a Python",
-        "function of one resample; vectorized, it is of many resamples at once.",
-        "",
         "| study | masrel | " + " | ".join(peers) + " |",
         "|---|---|" + "---|" * len(peers),
     ]
@@ -66,15 +44,11 @@ def _bootstrap(results: Results) -> list[str]:
     return [
         *text,
         "",
-        "At 10 000 items scipy draws 500 resamples, times 20.",
-        "",
     ]
 
 
 def _exact(results: Results) -> list[str]:
     text = [
-        "### Exact bootstrap",
-        "",
         "| study | distribution | time |",
         "|---|---|---|",
     ]
@@ -85,16 +59,8 @@ def _exact(results: Results) -> list[str]:
 
 
 def _memory(results: Results) -> list[str]:
-    shown = ", ".join(f"{kind} {mb:.0f} MB" for kind, mb in results.megabytes.items())
-    return [
-        "### Memory",
-        "",
-        "Most at once beside a million items by five raters, bytes, 10 000 resamples "
-        f"of items: {shown}.",
-        "`tests/intervals/test_costs.py` holds the bootstrap, the jackknife and the "
-        "delta method below 50 MB. A million clusters",
-        "or rows that nearly all differ take less than 1 GB.",
-    ]
+    rows = [f"| {kind} | {mb:.0f} MB |" for kind, mb in results.megabytes.items()]
+    return ["| 10 000 resamples of 1,000,000 × 5 | most memory |", "|---|---|", *rows]
 
 
 def _number(ratio: float) -> str:

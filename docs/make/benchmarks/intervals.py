@@ -5,17 +5,11 @@
 """
 
 import argparse
-import platform
 import warnings
-from pathlib import Path
 
-import masrel
 from docs.make.benchmarks.interval_page import Results, write_page
 from tests.benchmarks.bootstrap import by_items, exact_cost, memory
-from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import one_thread
-
-DOCS = Path(__file__).parents[2]
 
 
 def main() -> None:
@@ -32,10 +26,7 @@ def main() -> None:
         )
     if quick:
         return
-    packages = ["numpy", "scipy"]
-    machine = f"{platform.machine()}, Python {platform.python_version()}"
-    versions = {"masrel": masrel.__version__, **present(packages)}
-    write_page(DOCS / "evidence/benchmarks.md", results, versions, machine)
+    write_page(results)
 
 
 if __name__ == "__main__":

@@ -10,13 +10,11 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from importlib.metadata import version
 from pathlib import Path
 
-from docs.make.benchmarks.parts import write_part
+from docs.make.evidence import write_tables
 from tests.benchmarks.large_text import ORDERS, Run, measured, ratio
 
-PAGE = Path(__file__).parents[2] / "evidence" / "benchmarks.md"
 TURNS = 5
 
 
@@ -56,27 +54,15 @@ def main() -> None:
             loads.append(os.getloadavg()[0])
             rows.append(line(order, measured(path, turns)))
     lines = [
-        "## A large file of text",
-        "",
-        "`python -m docs.make.benchmarks.large_text` repeats this part: `masrel agree "
-        "FILE` of 5 000 000 rows of text, `item0000001,rater1,3`, 1 000 000 items by 5 "
-        "raters on 4 grades, 105 MB, as a process of its own, imports and all checks, "
-        "beside pandas' `read_csv`, `pivot` and Fleiss' κ in numpy, and beside DuckDB "
-        "counting how often each combination of grades occurs and doing nothing else; "
-        f"in turn, medians of {TURNS} turns of processor time and of the clock, and "
-        "the largest memory; ± is half the range of the ratios. "
-        f"{os.cpu_count()} processors with a load of {min(loads):.1f} to "
-        f"{max(loads):.1f}; pandas {version('pandas')}, DuckDB {version('duckdb')}.",
-        "",
-        "| rows | masrel agree | pandas | ratio, processor | clock | DuckDB | ratio, "
-        "processor | clock |",
+        "| rows | masrel | pandas | ratio, processor | ratio, clock "
+        "| DuckDB | ratio to DuckDB, processor | ratio to DuckDB, clock |",
         "|---|---|---|---|---|---|---|---|",
         *rows,
     ]
     if options.quick:
         print("\n".join(lines))
         return
-    write_part(PAGE, "large text", lines)
+    write_tables(["large_text"], lines)
 
 
 if __name__ == "__main__":

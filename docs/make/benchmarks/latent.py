@@ -8,15 +8,12 @@ is sampled once, under one prior.
 import time
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from docs.make.benchmarks.parts import write_part
+from docs.make.evidence import EVIDENCE, write_part
 from masrel.intervals import latent_trait
-
-DOCS = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +86,7 @@ def main() -> None:
         "|---|---|---|---|---|---|",
         *map(measure, STUDIES),
     ]
-    write_part(DOCS / "evidence/latent_trait.md", "costs", lines)
+    write_part(EVIDENCE / "latent_trait.md", "costs", "\n".join(lines))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@
 """
 
 import argparse
-import platform
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -17,15 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import masrel
-from docs.make.benchmarks.parts import write_part
 from docs.make.benchmarks.reading import Question, measure
+from docs.make.evidence import write_tables
 from masrel.agreement import fleiss_kappa, gwet_ac, krippendorff_alpha
 from masrel.estimates import Estimate
 from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import Timing, one_thread, side_by_side
 
-DOCS = Path(__file__).parents[2]
 TURNS = 7
 Floats = NDArray[np.float64]
 FILE = "measurements.csv"
@@ -195,29 +192,11 @@ def main() -> None:
     of_files = files(1 if quick else 5)
     with one_thread():
         of_coefficients = coefficients(quick)
-    versions = {"masrel": masrel.__version__, **present(["numpy", "krippendorff"])}
     lines = [
-        "## Measurements",
-        "",
-        "`python -m docs.make.benchmarks.measurements` repeats this part: ratings no "
-        "two of which are alike, in turn in one run; medians of processor time, ± is "
-        "the relative half-distance of the quartiles. Beside masrel is the shortest "
-        "formula in numpy of the same value, of complete ratings alone and without "
-        "checks: variances for squared differences, ranks for absolute ones. For "
-        "ratios there is none but over every pair. The package krippendorff makes a "
-        "table of items × grades × grades, 67 GiB for 1,000 × 3.",
-        "",
-        f"{platform.machine()}, Python {platform.python_version()}; "
-        + ", ".join(f"{name} {version}" for name, version in versions.items())
-        + ".",
-        "",
         "| items × raters | coefficient | value | value and error | beside: value "
         "| ratio of these | values differ by |",
         "|---|---|---|---|---|---|---|",
         *of_coefficients,
-        "",
-        "`masrel agree FILE` of 6 667 items by 3 raters, 20 001 different grades, as a "
-        "process of its own, as under [Reading files](#reading-files):",
         "",
         "| what | masrel agree | beside | ratio |",
         "|---|---|---|---|",
@@ -226,7 +205,7 @@ def main() -> None:
     if quick:
         print("\n".join(lines))
         return
-    write_part(DOCS / "evidence/benchmarks.md", "measurements", lines)
+    write_tables(["measurements", "measured_files"], lines)
 
 
 if __name__ == "__main__":

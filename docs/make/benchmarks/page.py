@@ -1,14 +1,13 @@
-"""The page of benchmarks and its figures."""
+"""Benchmarks of estimates as rows, and their figures."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.figure import Figure
 
-from docs.make.benchmarks.parts import write_part
+from docs.make.evidence import write_tables
 
 if TYPE_CHECKING:
     from docs.make.benchmarks.agreement import Line
@@ -90,95 +89,36 @@ def _ratings(name: str) -> int:
     return int(n) * int(r)
 
 
-def slope(lines: "Sequence[Line]") -> float:
-    """Return the steepest of our slopes from 10 000 items on, with errors."""
-    points = [(_ratings(x.name), x.times[OURS[1]].median) for x in lines]
-    large = np.log([pair for pair in points if pair[0] >= 50_000])
-    return float((np.diff(large[:, 1]) / np.diff(large[:, 0])).max())
-
-
 def write_page(
-    path: Path,
-    lines: "Sequence[Line]",
-    more: "Sequence[Line]",
-    megabytes: Mapping[str, float],
-    versions: Mapping[str, str],
-    machine: str,
+    lines: "Sequence[Line]", more: "Sequence[Line]", megabytes: Mapping[str, float]
 ) -> None:
-    """Write the part of the page in Markdown."""
-    text = [
-        "## Estimates",
-        "",
-        "`python -m docs.make.benchmarks.agreement` repeats this part: every function "
-        "in turn in one run, medians; ± is the",
-        "relative half-distance of the quartiles. Times are of one machine with other "
-        "load; ratios are what to look at. masrel",
-        "computes Fleiss' κ, AC1 and α, and their standard errors where it says so; "
-        "each peer one coefficient, irrCAC with",
-        "its error, the others without.",
-        "",
-        f"{machine}; " + ", ".join(f"{k} {v}" for k, v in versions.items()) + ".",
-        "",
-        "### From a matrix of whole numbers",
-        "",
-        "| items × raters | masrel, three | with errors | "
-        + " | ".join(_peers(lines))
-        + " | ratio |",
-        "|---|---|---|" + "---|" * len(_peers(lines)) + "---|",
-    ]
+    """Write the rows."""
+    peers = _peers(lines)
+    text = ["| items × raters | masrel, three | with errors | "]
+    text[0] += " | ".join(peers) + " | ratio | ratio with errors |"
+    text += ["|---|---|---|" + "---|" * (len(peers) + 2)]
     for line in lines:
-        cells = [_seconds(line, name) for name in (*OURS, *_peers(lines))]
-        text.append(f"| {line.name} | " + " | ".join(cells) + f" | {_ratio(line)} |")
-    steepest = slope(lines)
-    text += [
-        "",
-        "Ratio: masrel's three coefficients over the fastest peer's one; with errors "
-        f"it is {_with_errors(lines)}. From 10 000 "
-        f"items on, log time against log ratings rises by at most {steepest:.2f}.",
-        "",
-        "![Time against ratings](../figures/benchmark_time.png)",
-        "",
-        "Most memory at once beyond the input, 10 million items by 3 raters: "
-        + ", ".join(f"{name} {mb:,.0f} MB" for name, mb in megabytes.items())
-        + f" (ratio {megabytes['masrel'] / megabytes['statsmodels']:.3f}).",
-        "",
-        "### Other ways in",
-        "",
-        "| what | masrel | beside | ratio |",
-        "|---|---|---|---|",
-    ]
+        cells = [_seconds(line, name) for name in (*OURS, *peers)]
+        cells += [_ratio(line), _with_errors(line)]
+        text.append(f"| {line.name} | " + " | ".join(cells) + " |")
+    text += ["", "| what | masrel | beside | ratio |", "|---|---|---|---|"]
     for line in more:
         text.append(
             f"| {line.name} | {_seconds(line, 'masrel')} | {line.best}: "
             f"{_seconds(line, line.best)} | {_ratio(line)} |"
         )
-    text += [
-        "",
-        "A standard error is computed when it is read. In the smallest studies three "
-        "of them cost more than the estimates.",
-        "",
-        "### Error against time",
-        "",
-        "Five raters, all items but five unanimous in one category, so that chance "
-        "agreement is near 1; error against the value in",
-        "fractions. The dashed line is half a unit in the last place below 1. irrCAC "
-        "rounds to five decimals.",
-        "",
-        "![Error against time](../figures/benchmark_error.png)",
-    ]
-    write_part(path, "estimates", text)
+    text += ["", "| 10,000,000 × 3 | most memory |", "|---|---|"]
+    text += [f"| {name} | {mb:,.0f} MB |" for name, mb in megabytes.items()]
+    write_tables(["estimates", "inputs", "memory"], text)
 
 
 def _peers(lines: "Sequence[Line]") -> list[str]:
     return [name for name in lines[0].times if name not in OURS]
 
 
-def _with_errors(lines: "Sequence[Line]") -> str:
-    shown = []
-    for line in lines:
-        ratio = line.times[OURS[1]].median / line.times[line.best].median
-        shown.append(f"1/{1 / ratio:.0f}" if ratio < 0.2 else f"{ratio:.2f}")
-    return ", ".join(shown)
+def _with_errors(line: "Line") -> str:
+    ratio = line.times[OURS[1]].median / line.times[line.best].median
+    return f"1/{1 / ratio:.0f}" if ratio < 0.2 else f"{ratio:.2f}"
 
 
 def _seconds(line: "Line", name: str) -> str:

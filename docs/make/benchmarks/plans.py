@@ -6,20 +6,16 @@
 000 of them, in one run.
 """
 
-import platform
 import time
-from pathlib import Path
 
 import numpy as np
 
-import masrel
-from docs.make.benchmarks.parts import write_part
+from docs.make.evidence import write_tables
 from masrel.agreement import fleiss_kappa
 from masrel.planning import Study
 from masrel.planning import _studies as masrel_studies
 from masrel.planning._truth import Design, design_of
 
-PAGE = Path(__file__).parents[2] / "evidence" / "benchmarks.md"
 N_STUDIES, N_LOOPED = 1_000_000, 2_000
 
 
@@ -63,30 +59,14 @@ def main() -> None:
     clock, processor = simulated(N_STUDIES)
     second = looped(N_LOOPED)
     each = 0.5 * (first[1] + second[1]) / N_LOOPED
-    write_part(
-        PAGE,
-        "plans",
-        [
-            "## Simulated studies",
-            "",
-            "`python -m docs.make.benchmarks.plans` repeats this part: Fleiss' κ "
-            "and its standard error in 1,000,000 studies of 30 items by 5 raters, four "
-            "categories, drawn and computed; beside it `fleiss_kappa(…)"
-            f".standard_error` study by study, tables ready, on {N_LOOPED:,} of "
-            "them before and after, in one run.",
-            "",
-            f"{platform.machine()}, Python {platform.python_version()}; masrel "
-            f"{masrel.__version__}, numpy {np.__version__}.",
-            "",
-            "| | clock | processor | a study |",
-            "|---|---|---|---|",
-            f"| whole studies in arrays | {clock:.1f} s | {processor:.1f} s "
-            f"| {1e6 * processor / N_STUDIES:.1f} µs |",
-            f"| a call a study | – | – | {1e6 * each:.0f} µs |",
-            "",
-            f"Ratio: 1/{each * N_STUDIES / processor:.0f}.",
-        ],
-    )
+    lines = [
+        "| how | clock | processor | a study |",
+        "|---|---|---|---|",
+        f"| whole studies in arrays | {clock:.1f} s | {processor:.1f} s "
+        f"| {1e6 * processor / N_STUDIES:.1f} µs |",
+        f"| a call a study | – | – | {1e6 * each:.0f} µs |",
+    ]
+    write_tables(["plans"], lines)
 
 
 if __name__ == "__main__":

@@ -15,9 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from docs.make.benchmarks.parts import write_part
+from docs.make.evidence import write_tables
 
-DOCS = Path(__file__).parents[2]
 TURNS = 5
 COMPILED = Path(tempfile.gettempdir()) / "masrel_compiled"
 
@@ -178,14 +177,6 @@ def main() -> None:
         turns = 1 if options.quick else TURNS
         rows = [measure(question, folder, turns) for question in QUESTIONS]
     lines = [
-        "## Reading files",
-        "",
-        "`python -m docs.make.benchmarks.reading` repeats this part: `masrel agree "
-        "FILE` as a process of its own, imports and all, compiled as pip leaves what "
-        "it installs, beside a process with pandas, "
-        f"in turn; medians of {TURNS} turns of processor time and the largest memory; "
-        "± is half the range of the ratios.",
-        "",
         "| file | masrel agree | beside | ratio |",
         "|---|---|---|---|",
         *rows,
@@ -193,7 +184,7 @@ def main() -> None:
     if options.quick:
         print("\n".join(lines))
         return
-    write_part(DOCS / "evidence/benchmarks.md", "reading", lines)
+    write_tables(["reading"], lines)
 
 
 if __name__ == "__main__":

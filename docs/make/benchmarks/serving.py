@@ -6,15 +6,13 @@ nothing else.
 """
 
 import argparse
-import platform
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-import masrel
-from docs.make.benchmarks.parts import write_part
+from docs.make.evidence import write_tables
 from masrel.lab.hess._clock import real_time
 from tests.benchmarks.bench_serve import (
     Lateness,
@@ -27,7 +25,6 @@ from tests.benchmarks.bench_serve import (
 )
 from tests.lab.serve.pages import small_study
 
-DOCS = Path(__file__).parents[2]
 FLOOD_HZ = 1000.0
 RUN, SERVED, FLOODED = (
     "`masrel run`",
@@ -131,7 +128,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     lengths_s = (12.0,) if quick else (*(12.0,) * 7, 60.0)
     turns, n_grades, n_stops = (1, 2, 2) if quick else (3, 20, 10)
-    with real_time() as granted:
+    with real_time():
         pass  # what a loop would be granted here
     with tempfile.TemporaryDirectory() as folder:
         tables = lateness(Path(folder), lengths_s)
@@ -140,25 +137,7 @@ def main() -> None:
         print("\n".join(of_taps))
     if quick:
         return
-    lines = [
-        "## Sessions by the browser",
-        "",
-        "`python -m docs.make.benchmarks.serving` repeats this part: sessions in real "
-        "time on the simulated device, whose simulated hand moves the arm; the same "
-        f"one in turn by `masrel run` and by the browser, {len(lengths_s)} turns. A "
-        "tick is late by how long after its time it reads the arm, as its recording "
-        "has it. Both pages keep their streams open, the coordinator's with the live "
-        "view; browsers are Python clients on the same machine, on any processor. "
-        "Taps are those of the rater's page.",
-        "",
-        f"{platform.machine()}, Python {platform.python_version()}; "
-        f"masrel {masrel.__version__}; the loop was granted {granted}.",
-        "",
-        *tables,
-        "",
-        *of_taps,
-    ]
-    write_part(DOCS / "evidence/benchmarks.md", "serving", lines)
+    write_tables(["serving", "taps"], [*tables, "", *of_taps])
 
 
 if __name__ == "__main__":

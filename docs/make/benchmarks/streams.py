@@ -7,23 +7,20 @@ is loaded late.
 """
 
 import argparse
-import platform
 import statistics
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from docs.make.benchmarks.parts import write_part
 from docs.make.benchmarks.reading import run
+from docs.make.evidence import FIGURES, write_tables
 
-DOCS = Path(__file__).parents[2]
 RATERS = "ABCDE"
 BLOCK = 1 << 20  # items, or ratings, that are written at once
 N_BLOCKS = 20
@@ -221,42 +218,12 @@ def row(point: Point) -> str:
 
 
 def page(points: list[Point]) -> list[str]:
-    """Return the part of the page."""
-    slopes = ", ".join(
-        f"{slope(own):.2f} ({KINDS[kind]})"
-        for kind in KINDS
-        if len(own := [p for p in points if p.kind == kind]) > 1
-    )
+    """Return the table of all points."""
     rows = sorted(points, key=lambda p: (list(KINDS).index(p.kind), p.n_ratings))
     return [
-        "## Files larger than memory",
-        "",
-        "`python -m docs.make.benchmarks.streams` repeats this: `masrel agree FILE "
-        "--stream` of Parquet as a process of its own, imports and all checks, "
-        "beside a process in which DuckDB counts how often each combination of grades "
-        "occurs and does nothing else, in turn, once or twice; processor time "
-        "and the largest memory; ± is half the range of the ratios. Items are numbers "
-        "of 32 bits or text (`p17`), rated by 5 raters on 5 grades; DuckDB may take "
-        "900 MB, of 10⁸ ratings of items that are text 2000 MB, as it stops with less.",
-        "",
-        f"{platform.machine()}, Python {platform.python_version()}; pyarrow "
-        f"{version('pyarrow')}, DuckDB {version('duckdb')}.",
-        "",
         "| file | ratings | masrel agree | DuckDB's group-by | ratio |",
         "|---|---|---|---|---|",
         *map(row, rows),
-        "",
-        "Log time against log ratings rises, between the two largest files, by "
-        f"{slopes}.",
-        "",
-        "![Time against ratings of streams](../figures/benchmark_streams.png)",
-        "",
-        "Dashed and open: not run, but extrapolated in a straight line through the two "
-        "largest files, because what Python takes to start makes a slope look flat.",
-        "",
-        "masrel reads a file twice: once for the ratings that differ and where each is "
-        "met first, once for the items. Of a wide table that is to see that none is "
-        "there twice: most of its time, and no part of the query of DuckDB.",
     ]
 
 
@@ -277,8 +244,8 @@ def main() -> None:
     if options.quick:
         print("\n".join(page(points)))
         return
-    draw(points, DOCS / "figures" / "benchmark_streams.png")
-    write_part(DOCS / "evidence/benchmarks.md", "streams", page(points))
+    draw(points, FIGURES / "benchmark_streams.png")
+    write_tables(["streams"], page(points))
 
 
 if __name__ == "__main__":

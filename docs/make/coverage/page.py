@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from string import Template
 
 import matplotlib as mpl
 import pandas as pd
@@ -10,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from docs.make.coverage.study import monte_carlo_error
+from docs.make.evidence import table, with_part
 
 LOWEST, HIGHEST = 0.925, 0.985
 """A coverage below is too low, and one above is higher than need be."""
@@ -40,46 +40,54 @@ RULES: Looks = {
 }
 _LEAST = 50.0  # %, where all that is below is drawn
 _CELL = ["population", "size"]
-_CAPTION = "*A marker is the worst coefficient of a cell; its line ends at their mean.*"
-_TEMPLATE = Path(__file__).with_name("page_template.md")
 
 
 def write_page(folder: Path) -> None:
-    """Write the page and its figures from the rows in a folder."""
-    (folder / "coverage.md").write_text(page(folder), encoding="utf-8")
+    """Write the parts of the page and its figures from the rows in a folder."""
+    path = folder / "coverage.md"
+    path.write_text(page(path.read_text("utf-8"), folder), encoding="utf-8")
     first = _of_first(read(folder / "coverage.csv"))
     panels = first["study"].map(QUESTIONS) + ": " + first["family"]
     figures = folder.parent / "figures"
     draw(first.assign(panel=panels), figures / "coverage.png", LOOKS)
-    if (decided := folder / "coverage_defaults.csv").exists():
-        rows = read(decided)
-        path = figures / "coverage_defaults.png"
-        draw(rows.assign(panel=rows["family"]), path, RULES)
+    rows = read(folder / "coverage_defaults.csv")
+    path = figures / "coverage_defaults.png"
+    draw(rows.assign(panel=rows["family"]), path, RULES)
 
 
-def page(folder: Path) -> str:
-    """Return the page in Markdown."""
+def page(text: str, folder: Path) -> str:
+    """Return the page with the parts that its rows say."""
     rows = read(folder / "coverage.csv")
-    n = int(rows["n_studies"].max())
     default = rows[rows["method"] == "default"]
-    first = _of_first(rows)
-    three, place = ["items", "raters", "both"], ["study", "family", "size"]
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        n_studies=f"{n:,}".replace(",", " "),
-        error=f"{100 * monte_carlo_error(0.95, n):.1f}",
-        n_cells=rows.groupby(["study", "family", *_CELL]).ngroups,
-        n_default=len(default),
-        n_low=(default["coverage"] < LOWEST).sum(),
-        n_high=(default["coverage"] > HIGHEST).sum(),
-        by_coefficient=table(_of(default, three), place, "coefficient"),
-        by_method=table(_of(first, three), place, "method"),
-        summary=summary(_of(first, three), ["study", "method"]),
-        two_coefficients=table(_of(default, ["two raters"]), ["size"], "coefficient"),
-        two_methods=table(_of(first, ["two raters"]), ["size"], "method"),
-        careless=table(_of(default, ["careless raters"]), ["size"], "coefficient"),
-        failures=_failures(default),
-        rules=_rules(folder),
+    n = int(rows["n_studies"].max())
+    n_low, n_high = (
+        int(of.sum())
+        for of in (default["coverage"] < LOWEST, default["coverage"] > HIGHEST)
     )
+    drawn = (
+        f"{n} studies in each of {rows.groupby(['study', 'family', *_CELL]).ngroups} "
+        "cells: a population, a number of items and one of raters. A coverage of 95 % "
+        f"has a Monte Carlo error of {100 * monte_carlo_error(0.95, n):.1f} %."
+    )
+    counts = (
+        f"Of {len(default)} intervals (a cell and a coefficient each) {n_low} cover "
+        f"less than {100 * LOWEST} % and {n_high} more than {100 * HIGHEST} %."
+    )
+    first = _of_first(rows)
+    for name, part in {
+        "drawn": drawn,
+        "default": f"{counts}\n\n{summary(default, ['study', 'family'])}",
+        "methods": crossed(first, "method", "study"),
+        "rules": crossed(_of_rules(folder, "coverage_defaults"), "method", "family"),
+        "held out": crossed(_of_rules(folder, "coverage_held_out"), "method", "family"),
+    }.items():
+        text = with_part(text, name, part)
+    return text
+
+
+def _of_rules(folder: Path, name: str) -> pd.DataFrame:
+    rows = read(folder / f"{name}.csv")
+    return rows[(rows["answered"] > 0.0) & rows["method"].isin([BEFORE, AFTER])]
 
 
 def read(path: Path) -> pd.DataFrame:
@@ -89,96 +97,41 @@ def read(path: Path) -> pd.DataFrame:
     return rows
 
 
-def _of(rows: pd.DataFrame, studies: Sequence[str]) -> pd.DataFrame:
-    return rows[rows["study"].isin(studies)]
-
-
 def _of_first(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of the coefficient that every method has."""
     return rows[rows["coefficient"].isin(["fleiss_kappa", "cohen_kappa"])]
 
 
-def marked(coverage: float) -> str:
-    """Return it in %; bold: it is too low; italic: it is higher than need be."""
-    share = f"{100 * coverage:.0f}"
-    if coverage < LOWEST:
-        return f"**{share}**"
-    return f"*{share}*" if coverage > HIGHEST else share
-
-
-def table(rows: pd.DataFrame, lines: Sequence[str], columns: str) -> str:
-    """Return coverages in Markdown, cells of one place joined by strokes."""
-    shown = rows.assign(shown=rows["coverage"].map(marked))
-    joined = shown.groupby([*lines, columns], sort=False)["shown"].agg(" / ".join)
-    return _markdown(joined.unstack(columns, fill_value="", sort=False), lines)
-
-
 def summary(rows: pd.DataFrame, lines: Sequence[str]) -> str:
     """Return a line a group in Markdown: how many fail, and what they cover."""
-    groups = rows.groupby(list(lines), sort=False)
-    percent = 100 * groups["coverage"].agg(["min", "mean", "max"])
-    nowhere = 100 * (1.0 - groups["answered"].mean())
-    return _markdown(
-        pd.DataFrame({
-            "intervals": groups.size(),
-            "too low": groups["coverage"].agg(lambda of: (of < LOWEST).sum()),
-            "least %": percent["min"].map("{:.0f}".format),
-            "mean %": percent["mean"].map("{:.0f}".format),
-            "most %": percent["max"].map("{:.0f}".format),
-            "mean width": groups["width"].mean().map("{:.2f}".format),
-            "no interval %": nowhere.map("{:.1f}".format),
-        }),
-        lines,
-    )  # fmt: skip
+    shown = list[list[object]]()
+    for names, of in rows.groupby(list(lines), sort=False):
+        percent = 100 * of["coverage"]
+        n_low = int((of["coverage"] < LOWEST).sum())
+        ends = [f"{x:.0f}" for x in (percent.min(), percent.mean(), percent.max())]
+        shown.append([*names, len(of), n_low, *ends, f"{of['width'].mean():.2f}"])
+    head = ["intervals", "too low", "least %", "mean %", "most %", "mean width"]
+    return table([*lines, *head], shown, n_text=len(lines))
 
 
-def _failures(rows: pd.DataFrame) -> str:
-    """Return a line a cell that fails, of the coefficient that is covered least."""
-    cells = ["study", "family", *_CELL]
-    low = rows[rows["coverage"] < LOWEST].groupby(cells, sort=False)["coverage"]
-    worst = rows.loc[low.idxmin()].assign(nowhere=lambda of: 1.0 - of["answered"])
-    lines = [*cells, "coefficient"]
-    shares = worst.set_index(lines)[
-        ["coverage", "truth_below", "truth_above", "nowhere"]
-    ]
-    shown = shares.map(lambda share: f"{100 * share:.0f}")
-    heads = ["covered %", "truth below %", "truth above %", "no interval %"]
-    return _markdown(shown.set_axis(heads, axis=1), lines)
-
-
-def _rules(folder: Path) -> str:
-    """Return what became of the default for other items, where that is known."""
-    parts = []
-    if (folder / "coverage_defaults.csv").exists():
-        parts = ["![Coverage of the rules](../figures/coverage_defaults.png)", _CAPTION]
-    for name, title in (
-        ("coverage_defaults.csv", "Of the cells by which the rule was chosen:"),
-        ("coverage_held_out.csv", "Of cells drawn once it was:"),
-    ):
-        if not (folder / name).exists():
-            continue
-        rows = read(folder / name)
-        rows = rows[rows["answered"] > 0.0]  # a method may have none of a coefficient
-        # of each cell the coefficient that is covered least
-        lines = ["family", *_CELL]
-        worst = rows.groupby([*lines, "method"], sort=False)["coverage"].min()
-        worst = worst.reset_index()
-        fails = worst[(worst["method"] == AFTER) & (worst["coverage"] < LOWEST)]
-        parts += [title, summary(rows, ["family", "method"])]
-        if fails.empty:
-            parts += [f"`{AFTER}` is nowhere too low."]
-            continue
-        parts += [f"Where `{AFTER}` is too low, the worst coefficient:"]
-        parts += [table(worst.merge(fails[lines], on=lines), lines, "method")]
-    return "\n\n".join(parts) or "It was not run yet."
-
-
-def _markdown(frame: pd.DataFrame, lines: Sequence[str]) -> str:
-    """Return a table whose first columns are text, the others numbers."""
-    whole = frame.reset_index().astype(str)
-    rule = ["---"] * len(lines) + ["---:"] * (whole.shape[1] - len(lines))
-    rows = [list(whole.columns), rule, *whole.to_numpy().tolist()]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+def crossed(rows: pd.DataFrame, line: str, column: str) -> str:
+    """Return mean coverages in Markdown, and how many intervals are too low."""
+    columns = list(rows[column].unique())
+    shown = list[list[object]]()
+    for name, of_line in rows.groupby(line, sort=False):
+        groups = [of_line[of_line[column] == c]["coverage"] for c in columns]
+        shown.append(
+            [
+                name,
+                *(
+                    f"{100 * of.mean():.0f} ({int((of < LOWEST).sum())} of {len(of)})"
+                    if len(of)
+                    else "–"
+                    for of in groups
+                ),
+            ]
+        )
+    return table([line, *columns], shown)
 
 
 def draw(rows: pd.DataFrame, path: Path, looks: Looks) -> None:
