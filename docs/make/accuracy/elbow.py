@@ -66,8 +66,8 @@ def main() -> None:
     write_rows("accuracy_joint", rows(scenes))
     n_off = sum(not one.holds for one in every)
     text = (
-        f"Of {len(every)} scenes all but {n_off} are within 10⁻¹¹ s or 10⁻¹⁴ of the "
-        "duration, and their torques within 10⁻¹² of the largest term."
+        f"Of {len(every)} scenes {n_off or 'none'} is off by more than 10⁻¹¹ s and "
+        "10⁻¹⁴ of the duration, or in torque by more than 10⁻¹² of the largest term."
     )
     write_part(EVIDENCE / "accuracy.md", "joint", text)
 
