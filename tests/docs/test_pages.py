@@ -69,6 +69,8 @@ NOT_RUN = [
     ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
     ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
     ("docs/howto/laboratory/hardware.md", "needs a CAN bus"),
+    ("docs/howto/laboratory/moteus.md", "needs a CAN bus"),
+    ("docs/howto/laboratory/moteus.md", "serves until it is stopped"),
     ("docs/howto/laboratory/report.md", "needs Chromium"),
     ("docs/howto/laboratory/report.md", "needs other interpreters"),
     ("docs/howto/laboratory/serving.md", "serves until it is stopped"),

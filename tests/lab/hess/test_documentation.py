@@ -33,7 +33,7 @@ def row(first: str) -> list[str]:
 
 def test_the_devices_are_those_that_the_page_names() -> None:
     # When a backend is added, the page's first statement has to change.
-    assert device_names() == ("puck", "replay", "simulated")
+    assert device_names() == ("moteus", "puck", "replay", "simulated")
     assert "It has not been tested on physical hardware" in PAGE
     first = (DOCS / "howto/laboratory/hardware.md").read_text("utf-8").split("\n\n")[1]
     assert first.startswith("**Nothing on this page has been tested on physical hard")

@@ -17,12 +17,13 @@ from masrel.lab.hess._free_arm import (
     check_rest,
     check_torque_mode,
 )
-from masrel.lab.hess.moteus._frames import INT8, INT32
+from masrel.lab.hess.moteus._frames import FLOAT, INT8, INT32, write
 from masrel.lab.hess.moteus._moteus_device import ReadyServo, Servo
 from masrel.lab.hess.moteus._moteus_options import (
     DRIVEN,
     FAULTS,
     FIRMWARE,
+    FREE,
     HOME_STATE,
     SET_POSITION,
     TIMEOUT,
@@ -33,7 +34,7 @@ N_NODES = 127
 _PROBE_PATIENCE_S = 0.01
 _TICK_S = 0.001
 _STEP = math.radians(0.005)  # of the angle of an arm at rest
-_MOST_TICKS = 50  # from a stop to the torque mode
+_MOST_TICKS = 50  # from a stop to the torque mode; chosen
 _TOLERANCE = math.radians(0.1)  # of an arm that is held while it is zeroed
 
 
@@ -152,14 +153,14 @@ def check(link: Link, clock: Clock, options: MoteusOptions) -> tuple[Check, ...]
         If the bus fails, or the moteus does not answer, does not know where its output
         is, has other settings than a person's arm needs, or cannot be stopped.
     """
-    ready = ReadyServo(link, clock, options)
-    servo, (low, high) = ready.servo, ready.bounds
+    servo = ReadyServo(link, clock, options)
+    low, high = servo.bounds
     settings = Check(
         name="settings",
         holds=True,
         result=(
             f"bounds {math.degrees(low):.1f} to {math.degrees(high):.1f} deg, "
-            f"servo.timeout_mode {ready.timeout_mode:g}: free after silence"
+            f"servo.timeout_mode {FREE}: free after silence"
         ),
     )
 
@@ -183,17 +184,15 @@ def check(link: Link, clock: Clock, options: MoteusOptions) -> tuple[Check, ...]
 def _fall_silent(servo: Servo, options: MoteusOptions) -> None:
     for _ in range(_MOST_TICKS):
         servo.command(0.0)
-        if servo.answer().mode == DRIVEN:
-            break
+        driven = servo.answer().mode
         servo.wait(_TICK_S)
-    else:
-        raise DeviceError(f"{servo.name}: does not go into torque mode")
     servo.wait(2e-3 * options.watchdog_ms)
     servo.ask()
-    mode = servo.answer().mode
-    if mode != TIMEOUT:
+    silent = servo.answer().mode
+    if (driven, silent) != (DRIVEN, TIMEOUT):
         raise DeviceError(
-            f"{servo.name}: needs mode {TIMEOUT} after silence, got {mode}"
+            f"{servo.name}: needs mode {DRIVEN} under torque and {TIMEOUT} after "
+            f"silence, got {driven} and {silent}"
         )
 
 
@@ -227,8 +226,8 @@ def zero(link: Link, clock: Clock, options: MoteusOptions, *, angle: float) -> f
         raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
     servo = Servo(link, clock, options)
     servo.stop()  # its position is about to jump
-    servo.set(SET_POSITION, options.position(angle))
-    servo.wait(_TICK_S)
+    servo.ask(write(FLOAT, SET_POSITION, options.position(angle)))
+    servo.answer()  # from before
     servo.ask()
     position = servo.answer().position
     if abs(options.angle(position) - angle) > _TOLERANCE:

@@ -201,10 +201,6 @@ class Servo(Node):
         )
         return tuple(self._answer.pop(register) for register in registers)
 
-    def set(self, register: int, value: float) -> None:
-        """Write a register."""
-        self._send(write(FLOAT, register, value))
-
     def setting(self, name: str) -> float:
         """Return a setting, which its console alone tells."""
         self._console = b""
@@ -252,32 +248,31 @@ class Servo(Node):
             self._console += text
 
 
-class ReadyServo:
+class ReadyServo(Servo):
     """A moteus that is stopped and may be driven."""
 
     # Making one stops it and refuses what must not be near a person
 
     def __init__(self, link: Link, clock: Clock, options: MoteusOptions) -> None:
-        self.servo = servo = Servo(link, clock, options)
-        state = servo.stop()
+        super().__init__(link, clock, options)
+        state = self.stop()
         if state.code in FAULTS:
-            raise stopped_itself(servo, state.code)
-        (home_state,) = servo.get(INT8, HOME_STATE)
+            raise stopped_itself(self, state.code)
+        (home_state,) = self.get(INT8, HOME_STATE)
         if home_state < OUTPUT_KNOWN:
             raise DeviceError(
-                f"{servo.name}: does not know where its output is (home state "
+                f"{self.name}: does not know where its output is (home state "
                 f"{home_state:.0f}); hold the arm at a known angle and run masrel "
                 "device zero"
             )
-        self.timeout_mode = servo.setting("servo.timeout_mode")
-        if self.timeout_mode != FREE:
+        timeout_mode = self.setting("servo.timeout_mode")
+        if timeout_mode != FREE:
             raise DeviceError(
-                f"{servo.name}: needs servo.timeout_mode {FREE}, which lets the arm go "
-                f"after silence, got {self.timeout_mode:g}"
+                f"{self.name}: needs servo.timeout_mode {FREE}, which lets the arm go "
+                f"after silence, got {timeout_mode:g}"
             )
-        self.bounds = _bounds(servo, options)
-        self.angle = options.angle(state.position)
-        check_angle(servo.name, self.angle)
+        self.bounds = _bounds(self, options)
+        check_angle(self.name, options.angle(state.position))
 
 
 def _bounds(servo: Servo, options: MoteusOptions) -> tuple[float, float]:
@@ -306,13 +301,13 @@ class MoteusDevice(CanDevice[MoteusOptions]):
     def __init__(self, setup: DeviceSetup, options: MoteusOptions) -> None:
         super().__init__(setup, options, connected)
         self._driven_ns: int | None = None  # since when it has been told torques
+        self._commanded_ns = 0  # when it was told the last
         self._commanded: deque[float] = deque([0.0], maxlen=_TOLD_TICKS)  # N·m
         self._n_limited = self._n_off = 0  # answers in a row
         self._has_let_go = False  # by itself, or because somebody else stopped it
 
     def _bring_up(self) -> None:
-        ready = ReadyServo(self._link, self._setup.clock, self._options)
-        self._servo = ready.servo
+        self._servo = ReadyServo(self._link, self._setup.clock, self._options)
 
     def _read(self) -> Reading:
         try:
@@ -326,9 +321,10 @@ class MoteusDevice(CanDevice[MoteusOptions]):
 
     def _latest(self) -> State:
         servo = self._servo
-        silent_ns = self._setup.clock.now_ns() - servo.asked_ns
-        if servo.is_asked and silent_ns <= _RECENT_NS:
+        now_ns = self._setup.clock.now_ns()
+        if servo.is_asked and now_ns - servo.asked_ns <= _RECENT_NS:
             return servo.answer(self._options.patience_s + _LATE_S)
+        silent_ns = now_ns - self._commanded_ns
         if self._driven_ns and silent_ns > self._options.watchdog_ms * 1e6:
             # It has let go, and obeys nothing until it is stopped
             if self._commanded[-1] != 0.0:
@@ -352,13 +348,15 @@ class MoteusDevice(CanDevice[MoteusOptions]):
         if mode == TIMEOUT:
             raise self._timed_out()
         driven_ns = self._driven_ns
-        if driven_ns is None or state.time_ns - driven_ns < _PREPARING_NS:
-            is_right = mode in (STOPPED, *(PREPARING if driven_ns else ()), DRIVEN)
-        else:
-            is_right = mode == DRIVEN
-        if not is_right:
+        expected: tuple[int, ...] = (DRIVEN,)
+        if driven_ns is None:
+            expected = (STOPPED,)
+        elif state.time_ns - driven_ns < _PREPARING_NS:
+            expected = (STOPPED, *PREPARING, DRIVEN)
+        if mode not in expected:
             raise IdledError(
-                f"{servo.name}: needs mode {DRIVEN}, somebody else has set it to {mode}"
+                f"{servo.name}: needs mode {expected[-1]}, somebody else has set it to "
+                f"{mode}"
             )
         self._n_limited = self._n_limited + 1 if state.code in LIMITS else 0
         if self._n_limited > _MAX_LIMITED:
@@ -393,7 +391,8 @@ class MoteusDevice(CanDevice[MoteusOptions]):
             return  # a torque would start one that somebody else has stopped
         self._servo.command(torque_nm)
         self._commanded.append(torque_nm)
-        self._driven_ns = self._driven_ns or self._servo.asked_ns
+        self._commanded_ns = self._servo.asked_ns
+        self._driven_ns = self._driven_ns or self._commanded_ns
 
     def _release(self) -> None:
         self._servo.stop()

@@ -58,6 +58,9 @@ from masrel.lab.hess.moteus._moteus_options import (
 
 _FRAME_NS, _REPLY_NS = 140_000, 100_000  # a frame of the host, and its answer
 _OTHER_HOST_NS = 300_000
+_PREPARING_NS = 3_000_000  # from a stop to the first torque; chosen
+_COUNTS_PER_TURN = 131072  # of an encoder with 17 bits; chosen
+_DAMPING = 1.0  # of an arm that it brakes, N·m·s/rad; chosen
 _MAX_KEPT = 100_000  # torques that are remembered
 _ZERO_VELOCITY_NM = 5.0  # servo.timeout_max_torque_Nm
 _OUTSIDE_LIMITS, _TORQUE_LIMITED, _POSITION_LIMITED = 39, 102, 103
@@ -87,7 +90,7 @@ class MoteusEmulator(EmulatedAmplifier):
             clock=clock,
             faults=emulation.faults,
             motor=Motor(hand, range_end),
-            counts_per_turn=emulation.counts_per_turn,
+            counts_per_turn=_COUNTS_PER_TURN,
         )
         self._options = options
         self._home_state = emulation.home_state
@@ -134,9 +137,8 @@ class MoteusEmulator(EmulatedAmplifier):
             return
         is_stale = self.faults.hit("stale-replies", now_ns)
         self._last_answer = data = self._last_answer if is_stale else encode(answer)
-        source = self._options.servo
-        if self.faults.hit("renumbered-replies", now_ns):
-            source = source % 127 + 1
+        is_other = self.faults.hit("renumbered-replies", now_ns) is not None
+        source = (self._options.servo + is_other) % 128
         identifier = source << 8 | frame.identifier >> 8 & 0x7F
         self._answer(Frame(identifier, data), now_ns + _REPLY_NS)
 
@@ -181,7 +183,7 @@ class MoteusEmulator(EmulatedAmplifier):
                 return
             self.mode = PREPARING[0]
             self._begin_faults(now_ns)
-            ready_ns = now_ns + round(self._emulation.prepare_s * 1e9)
+            ready_ns = now_ns + _PREPARING_NS
             self._at(ready_ns, lambda _due: self._ready())
         self._n_commands += 1
         number, watchdog_s = self._n_commands, written.get(WATCHDOG, 0.0) or 0.1
@@ -216,7 +218,7 @@ class MoteusEmulator(EmulatedAmplifier):
         self.torques.append((now_ns, 0.0))
         damping, most = 0.0, math.inf
         if mode == TIMEOUT and self._emulation.timeout_mode != FREE:
-            damping = self._emulation.damping
+            damping = _DAMPING
             most = _ZERO_VELOCITY_NM if self._emulation.timeout_mode == 12 else most
         self.motor.brake(now_ns, damping, most)
 
@@ -279,7 +281,7 @@ class MoteusEmulator(EmulatedAmplifier):
             VELOCITY: self._options.direction * speed,
             TORQUE: self._current_torque(now_ns),
             HOME_STATE: self._home_state,
-            VOLTAGE: self._emulation.volts,
+            VOLTAGE: 24.0,
             TEMPERATURE: 30.0,
             CODE: self._code if limited is None else limited.amount,
             COUNTER: now_ns // 1_000_000,

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, Self
 from masrel.errors import ParameterError
 from masrel.lab.hess._can import BusOptions, check_direction
 from masrel.lab.hess._emulated import InjectedFault
-from masrel.lab.hess.limits import _check_not_negative, _check_positive
+from masrel.lab.hess.limits import _check_positive
 
 # Registers
 MODE, POSITION, VELOCITY, TORQUE = range(4)
@@ -73,36 +73,15 @@ class MoteusEmulatorOptions:
         without limit.
     lowest_angle_deg, highest_angle_deg : float
         The elbow's angles of its bounds of position; ``nan`` for none.
-    counts_per_turn : int
-        Counts of its encoder per turn of the output.
-    damping : float
-        Of an arm that it brakes, N·m·s/rad at the elbow; chosen.
-    prepare_s : float
-        How long it takes from a stop to the first torque, s; chosen.
-    volts : float
-        Of its supply.
     faults : tuple of InjectedFault
         What fails, and when.
-
-    Raises
-    ------
-    ParameterError
-        If a value is outside its range.
     """
 
     home_state: int = 2
     timeout_mode: int = FREE
     lowest_angle_deg: float = -4.0
     highest_angle_deg: float = 150.0
-    counts_per_turn: int = 131072
-    damping: float = 1.0
-    prepare_s: float = 0.003
-    volts: float = 24.0
     faults: tuple[InjectedFault, ...] = ()
-
-    def __post_init__(self) -> None:
-        _check_positive(counts_per_turn=self.counts_per_turn)
-        _check_not_negative(damping=self.damping, prepare_s=self.prepare_s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,7 +174,7 @@ class MoteusOptions(BusOptions):
 
     def angle(self, position: float) -> float:
         """Return the angle of the elbow, rad, at a position, turns."""
-        return (position - self.zero_rev) * self._rad_per_turn
+        return self.direction * (position - self.zero_rev) * math.tau / self.gear_ratio
 
     def output_torque(self, torque_nm: float) -> float:
         """Return its torque, N·m, for one at the elbow; positive resists extension."""
@@ -204,7 +183,3 @@ class MoteusOptions(BusOptions):
     def torque(self, output_nm: float) -> float:
         """Return the torque at the elbow, N·m, for one at its output."""
         return -self.direction * output_nm * self.gear_ratio
-
-    @property
-    def _rad_per_turn(self) -> float:
-        return self.direction * math.tau / self.gear_ratio

@@ -6,6 +6,7 @@
 import math
 import warnings
 from math import radians
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +16,9 @@ from masrel.lab.hess.puck import InjectedFault, steady_runs
 from tests.lab.hess.moteus.rig import opened, presented
 from tests.lab.hess.rig import ActingClock, missing
 
+PAGE = (Path(__file__).parents[4] / "docs/howto/laboratory/moteus.md").read_text(
+    "utf-8"
+)
 CATCH = 0.7  # HM3 at 92 deg/s is in its catch from 0.63 to 0.96 s
 LOST = "missed-replies"
 WATCHDOG_MS = 20.0
@@ -112,6 +116,8 @@ def test_a_fault_is_named_and_leaves_no_torque(
 ) -> None:
     named, numbers, words = outcome(injected)
     assert named == kind
+    if f"| {name} |" in PAGE:
+        assert row(name, named, numbers) in PAGE
     if kind is None:
         return
     noticed_ms, held, peak, zero_ms = numbers
@@ -148,8 +154,11 @@ def test_a_motor_that_turns_the_other_way_is_noticed_by_a_free_arm(
         assert abs(device.read().angle - radians(60.0)) < radians(2.0)
 
 
+def row(name: str, kind: str | None, numbers: list[float]) -> str:
+    cells = [f"{number:.1f}" for number in numbers] or [""] * 4
+    return "| " + " | ".join([name, kind or "let pass", *cells]) + " |"
+
+
 if __name__ == "__main__":
     for name, injected, _ in FAULTS:
-        kind, numbers, _ = outcome(injected)
-        cells = [f"{number:.1f}" for number in numbers] or [""] * 4
-        print("| " + " | ".join([name, kind or "let pass", *cells]) + " |")
+        print(row(name, *outcome(injected)[:2]))
