@@ -7,6 +7,7 @@ python -m docs.make.identification right [STUDIES]
 python -m docs.make.identification time
 """
 
+import csv
 import math
 import statistics
 import sys
@@ -31,6 +32,7 @@ from tests.lab.elbow.identification.test_lack_of_fit import (
 )
 
 FIGURES = Path(__file__).parents[1] / "figures"
+TERMS_TABLE = Path(__file__).parents[1] / "evidence" / "identification_terms.csv"
 HALF = Scatter(
     catch_angle=math.radians(1.0), catch_torque=0.05, catch_travel=math.radians(1.0)
 )
@@ -67,22 +69,20 @@ def coverage(n_studies: int) -> None:
 
 
 def wrong(n_studies: int) -> None:
-    """Print what 95 % intervals hold without and with what an arm has."""
-    print("| what the arm has | announced |", " | ".join(SYMBOLS), "| fitted |")
-    for scatter in (None, SCATTER):
-        for name, arm in WRONG.items():
-            case = {"arm": arm, "scatter": scatter}
-            for options in ({}, {TERMS[name]: "fitted"}):
-                total = counts(case, range(5000, 5000 + n_studies), **options)
-                row = [str(total[parameter]) for parameter in NAMES]
-                announced = total["does not fit"]
-                kind = "scattered" if scatter else "exact"
-                print(
-                    f"| {name}, {kind} | {announced} |",
-                    " | ".join(row),
-                    f"| {'yes' if options else 'no'} |",
-                    flush=True,
-                )
+    """Write what 95 % intervals hold without and with what an arm has."""
+    head = ["term", "catches", "fitted", "announced", *SYMBOLS]
+    with TERMS_TABLE.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(head)
+        for scatter in (None, SCATTER):
+            for name, arm in tqdm(WRONG.items()):
+                case = {"arm": arm, "scatter": scatter}
+                for options in ({}, {TERMS[name]: "fitted"}):
+                    total = counts(case, range(5000, 5000 + n_studies), **options)
+                    kind = "scattered" if scatter else "exact"
+                    is_fitted = "yes" if options else "no"
+                    row = [name, kind, is_fitted, total["does not fit"]]
+                    table.writerow([*row, *(total[parameter] for parameter in NAMES)])
 
 
 def right(n_studies: int) -> None:
