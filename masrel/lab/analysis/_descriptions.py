@@ -40,8 +40,9 @@ def intended_agreement(
     # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). Development of a Haptic Elbow
     # Spasticity Simulator (HESS). IEEE TNSRE, 20(3), 361-370, section IV.B.
     # https://doi.org/10.1109/TNSRE.2012.2195330
+    # what was too slow to be felt has no grade as intended, whichever it was given
     graded = Counter(
-        (row.model, row.grade)
+        (row.model, None if row.felt == "below-threshold" else row.grade)
         for row in ratings.rows
         if row.session == session and row.grade is not None
     )

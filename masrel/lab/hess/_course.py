@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from masrel.errors import LimitExceededError, ParameterError
-from masrel.lab.hess._signals import speed_margin
+from masrel.lab.hess._signals import Flexion, speed_margin
 from masrel.lab.hess.limits import DeviceLimits, _check_positive
 from masrel.lab.recording import PHASES
 
@@ -22,9 +22,10 @@ class StretchRules:
 
     With one stretch the presentation is over when the arm has arrived; the times below
     do not matter then. With several, a stretch is over when the arm has arrived or was
-    brought back, and the next one is armed by flexing it faster than ν_th, as the law
-    arms its next catch; where nothing was caught, by bringing it back at any speed. The
-    last one can be held like every other: all is over when the arm is brought back.
+    brought back. The next one is armed by flexing it faster than ν_th by 5 deg or for
+    100 ms, as a catch seldom throws a soft hand back; where nothing was caught, by
+    bringing it back at any speed. The last one can be held like every other: all is
+    over when the arm is brought back.
 
     Attributes
     ----------
@@ -113,7 +114,7 @@ class Course:
         self._n = math.inf if rules.n is None else rules.n
         self._time_limit, self._stretch_limit = rules.time_limit, rules.stretch_limit
         self._over_at = math.inf  # when no stretch may begin any more, s
-        self._flexing_speed = -speed_threshold
+        self._flexion, self._is_flexed = Flexion(speed_threshold), False
         self._begins_after = limits.arrival_angle
         self._begun_at = 0.0  # the stretch, s
         self._has_caught = False  # in the stretch
@@ -138,15 +139,16 @@ class Course:
             if not self.stretch:
                 self._watch_for_onset(time_s, angle)
             return "arrived" if has_arrived else ""
+        self._is_flexed = self._flexion.update(time_s, angle, velocity)
         if self.stretch:
             self._has_caught = self._has_caught or phase != _PRE_CATCH
-            return self._goes_on(time_s, angle, velocity, has_arrived)
+            return self._goes_on(time_s, angle, has_arrived)
         if time_s >= self._over_at:
             return "time-limit"
         if self.status.is_armed:
             self._watch_for_onset(time_s, angle)
             return ""
-        return self._watch_for_return(angle, velocity)
+        return self._watch_for_return(angle)
 
     def end(self) -> None:
         """Let the stretch that goes on be over."""
@@ -166,12 +168,10 @@ class Course:
             if self._over_at == math.inf:
                 self._over_at = time_s + self._time_limit
 
-    def _goes_on(
-        self, time_s: float, angle: float, velocity: float, has_arrived: bool
-    ) -> str:
-        if has_arrived or self._is_brought_back(angle, velocity):
+    def _goes_on(self, time_s: float, angle: float, has_arrived: bool) -> str:
+        if has_arrived or self._is_brought_back(angle):
             self.end()
-            return self._watch_for_return(angle, velocity)
+            return self._watch_for_return(angle)
         if time_s - self._begun_at > self._stretch_limit:
             raise LimitExceededError(
                 f"stretch limit: needs a stretch that ends within "
@@ -180,17 +180,17 @@ class Course:
             )
         return ""
 
-    def _is_brought_back(self, angle: float, velocity: float) -> bool:
-        return velocity <= self._flexing_speed or angle <= self._back_at
+    def _is_brought_back(self, angle: float) -> bool:
+        return self._is_flexed or angle <= self._back_at
 
-    def _watch_for_return(self, angle: float, velocity: float) -> str:
+    def _watch_for_return(self, angle: float) -> str:
         # Until then the last stretch is held, as every other is
-        if not self._is_brought_back(angle, velocity):
+        if not self._is_brought_back(angle):
             return ""
         if self.status.n_stretches == self._n:
             return "stretches"
         # The law catches again when the arm was flexed, or if it has not caught yet
-        if velocity <= self._flexing_speed or not self._has_caught:
+        if self._is_flexed or not self._has_caught:
             self._lowest_angle = angle
             self.status.is_armed = True
         return ""

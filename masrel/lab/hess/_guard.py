@@ -8,6 +8,8 @@ import math
 from collections import deque
 
 from masrel.errors import LimitExceededError
+from masrel.lab.hess._signals import CUTOFF_RAD_S
+from masrel.lab.hess.controller import Friction
 from masrel.lab.hess.limits import DeviceLimits
 
 # An arm that was faster than this cannot stop within a tick without 20 N·m on its
@@ -215,8 +217,6 @@ class Guard:
             interval = time_s - self._sent_at
             if interval < self._period:
                 interval = self._period
-                if self._sent_at == math.inf:
-                    self._begins_with(torque)
             if abs(torque - before) > limits.torque_rate * interval:
                 raise LimitExceededError(
                     f"torque rate: needs at most {limits.torque_rate:g} N·m/s, "
@@ -226,7 +226,8 @@ class Guard:
         self._sent = torque
         self._sent_at = time_s
 
-    def _begins_with(self, torque: float) -> None:
+    def begins_with(self, torque: float) -> None:
+        """Check what a model asks for before anything moves."""
         # A hand that has only just taken the arm does not expect more
         limit = self._limits.standing_torque
         if not -limit <= torque <= limit:
@@ -288,6 +289,53 @@ class Guard:
                 f"silence: needs a command every {limits.watchdog_time * 1e3:g} ms, "
                 f"the loop sent none for {gap_s * 1e3:.1f} ms",
                 "overrun",
+            )
+
+
+# So long may the sensor read another torque than the one that is sent; the low-pass of
+# the estimated speed is on the difference, too, so that a late sensor leaves little.
+_ACTUATOR_S = 0.05
+_SILENT_S = 0.01  # after which there is nothing to go on with
+
+
+class ActuatorGuard:
+    """Tell an actuator that does not do what it is told, by the torque sensor."""
+
+    # The sensor between the arm and the device reads what the arm pulls at:
+    #     τ_motor + B θ̇ + β sgn(θ̇) + I θ̈ with I, B, β of (7)
+    # Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370.
+
+    def __init__(self, limits: DeviceLimits, friction: Friction, rate_hz: int) -> None:
+        self._limit, self._friction = limits.actuator_torque, friction
+        self._gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
+        self._rate_hz = rate_hz
+        self._residual = 0.0  # measured less expected, N·m, late
+        self._speed = 0.0
+        self._within_s = self._read_s = 0.0  # when within the limit, and read, last, s
+
+    def check(
+        self, time_s: float, velocity: float, sent: float, measured: float
+    ) -> None:
+        """Check what was measured against the torque that was held until then."""
+        friction = self._friction
+        acceleration = (velocity - self._speed) * self._rate_hz
+        self._speed = velocity
+        if math.isnan(measured):  # no fault of the actuator; a sensor may be slower
+            return
+        if time_s - self._read_s > _SILENT_S:
+            self._within_s = time_s
+        self._read_s = time_s
+        moved = friction.inertia * acceleration + friction.viscous * velocity
+        moved += math.copysign(friction.coulomb, velocity) if velocity else 0.0
+        self._residual += self._gain * (measured - sent - moved - self._residual)
+        if abs(self._residual) <= self._limit:
+            self._within_s = time_s
+        elif time_s - self._within_s > _ACTUATOR_S:
+            raise LimitExceededError(
+                f"actuator: needs a torque within {self._limit:g} N·m of the one that "
+                f"is sent, got {self._residual:+.2f} N·m besides for "
+                f"{_ACTUATOR_S * 1e3:g} ms",
+                "actuator",
             )
 
 

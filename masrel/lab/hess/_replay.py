@@ -35,7 +35,7 @@ class ReplayDevice(Device):
     # After a fault the recording holds no readings any more, and so it ends there.
 
     name = "replay"
-    simulated = True
+    simulated = is_replay = True
 
     def __init__(self, recording: Recording, *, clock: Clock) -> None:
         columns = recording.columns

@@ -36,6 +36,24 @@ class VelocityEstimate:
         return self._velocity
 
 
+class Flexion:
+    """Tell an arm that is flexed from one that a catch throws back for a moment."""
+
+    _LEAST = math.radians(5.0)
+    _LEAST_S = 0.1
+
+    def __init__(self, speed_threshold: float) -> None:
+        self._speed = -speed_threshold
+        self._began_s = self._began_at = math.nan  # s and rad
+
+    def update(self, time_s: float, angle: float, velocity: float) -> bool:
+        """Return whether it has been flexed faster than ν_th far or long enough."""
+        if velocity > self._speed:
+            self._began_s, self._began_at = time_s, angle
+        way, time = self._began_at - angle, time_s - self._began_s
+        return way >= self._LEAST or time >= self._LEAST_S
+
+
 def speed_margin(angle_noise: float, rate_hz: float) -> float:
     """Return how far noise of the angle may move the speed, rad/s."""
     # Both as standard deviations: v = g/T (n_t - g Σ (1 - g)^k n_(t-1-k)) of

@@ -13,7 +13,7 @@ from typing import NoReturn
 from masrel.errors import LimitExceededError, ParameterError
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import JointModel
-from masrel.lab.hess._signals import CUTOFF_RAD_S, raised_cosine
+from masrel.lab.hess._signals import CUTOFF_RAD_S, Flexion, raised_cosine
 from masrel.lab.hess.limits import _check_not_negative, _check_positive
 from masrel.lab.recording import PHASES
 
@@ -154,9 +154,12 @@ class Controller:
     at once and stays there until the arm has been moved back, faster than ν_th. Within
     3 deg of the end of range no loss counts: there it is the joint that stops the arm.
 
-    Where a catch or post-catch ends otherwise, the torque goes from where it stands to
-    that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
-    meanwhile ends this at once.
+    After a catch there is none until the arm has been flexed faster than ν_th by 5 deg
+    or for 100 ms: a catch throws a soft hand back by less, within one push.
+
+    Where a catch or post-catch ends otherwise, or clonus is given up, the torque goes
+    from where it stands to that of the law within `post_catch_ramp`, along a raised
+    cosine. A grip that is lost meanwhile ends this at once.
 
     A model that is not passive is guarded: in every phase it is a fault when the arm
     gets within 6 ms more than 0.78 of the speed that the torque would give it if nobody
@@ -189,7 +192,7 @@ class Controller:
         soft hand for a lost grip, too small a one notices a lost grip late.
     post_catch_ramp : float, optional
         How long the end of a catch or post-catch takes, s, 0 to 1; 0 is the step of
-        Fig. 7. A guarded model has its own law there.
+        Fig. 7.
     rate_hz : int, optional
         Steps a second.
 
@@ -205,6 +208,8 @@ class Controller:
         Whether the model runs behind `DeviceLimits.active_energy` and `active_torque`.
     is_easing : bool
         Whether the last torque was on its way from the end of a catch or post-catch.
+    is_over : bool
+        Whether nothing may catch any more; set by `run_presentation` where it ends.
     is_new : bool
         Whether it has never been stepped: one controller makes one presentation.
     rate_hz : int
@@ -215,6 +220,8 @@ class Controller:
         from `DeviceLimits.encoder_noise`.
     speed_threshold : float
         Speed ν_th of the joint, rad/s.
+    friction : Friction
+        Friction of the device.
 
     Raises
     ------
@@ -258,8 +265,9 @@ class Controller:
             raise ParameterError(f"rate_hz: needs 1 or more, got {rate_hz}")
         self._joint = model.stepper(start_angle)
         self.is_guarded = not (model.is_passive or isinstance(model, ElbowParameters))
+        self.friction = friction or Friction()
         self._compensation = FrictionCompensation(
-            friction or Friction(),
+            self.friction,
             share=compensation,
             dead_zone=dead_zone,
             full_speed=full_speed,
@@ -287,6 +295,8 @@ class Controller:
         self._max_restored = -_INFINITE
         self._held: tuple[float, float, float] | None = None
         self.speed_threshold = model.speed_threshold
+        self._flexion, self._may_catch = Flexion(model.speed_threshold), True
+        self.is_over = False
         self.grip_lost = False
         self.model_torque = 0.0
         self.phase = _PRE_CATCH
@@ -335,17 +345,7 @@ class Controller:
                 self.is_easing = False
                 self.phase = _PRE_CATCH  # no end that takes its time
             past.append(restored)
-        torque = joint.step(time_s, angle, velocity)
-        try:
-            is_number = -_INFINITE < torque < _INFINITE
-        except TypeError:
-            is_number = False
-        if not is_number:  # the recording keeps the last that was one
-            raise LimitExceededError(
-                f"model: needs a torque that is a finite number, got {torque!r}",
-                "model",
-            )
-        self.model_torque = torque
+        self.model_torque = torque = self._wanted_torque(time_s, angle, velocity)
         command = torque - self._compensation.torque(velocity)
         phase = joint.phase
         if self.phase != phase:
@@ -355,14 +355,36 @@ class Controller:
         self._command = command
         return command
 
+    def _wanted_torque(self, time_s: float, angle: float, velocity: float) -> float:
+        # What the model asks for, with one catch within one push
+        joint = self._joint
+        torque = joint.step(time_s, angle, velocity)
+        if self.is_over or not self._may_catch:
+            self._may_catch = self._flexion.update(time_s, angle, velocity)
+            is_vetoed = self.is_over or not self._may_catch
+            if is_vetoed and self.phase == _PRE_CATCH != joint.phase:
+                joint.release()
+                torque = joint.step(time_s, angle, velocity)
+        try:
+            is_number = -_INFINITE < torque < _INFINITE
+        except TypeError:
+            is_number = False
+        if not is_number:  # the recording keeps the last that was one
+            raise LimitExceededError(
+                f"model: needs a torque that is a finite number, got {torque!r}",
+                "model",
+            )
+        return torque
+
     def _enter(self, phase: int, time_s: float) -> None:
         if self.phase == _PRE_CATCH and not self.is_guarded:
+            self._may_catch = False
             self._late_torque, self._taken = self._command, 0.0
             self._time = time_s
             self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
             self._max_restored = -_INFINITE
         ends = self.phase != _PRE_CATCH and phase == _PRE_CATCH
-        if ends and self._post_catch_ramp and not self.is_guarded:
+        if ends and self._post_catch_ramp:
             self._easing = iter(self._post_catch_ramp)
             self._stood = self._command
             n_ticks = len(self._post_catch_ramp)

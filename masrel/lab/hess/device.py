@@ -74,11 +74,15 @@ class Device(ABC):
     channels : tuple of Channel
         What it measures beside the angle, with every reading; none by default. The
         torque of its sensor is `masrel.lab.recording.MEASURED_TORQUE`.
+    is_replay : bool
+        Whether what it measures does not come of the torque that it is sent; False by
+        default.
     """
 
     name: ClassVar[str]
     simulated: bool
     channels: tuple[Channel, ...] = ()
+    is_replay: bool = False
 
     _state: _State = "new"  # on the class, so that `__del__` always finds one
 
@@ -114,10 +118,21 @@ class Device(ABC):
         Raises
         ------
         DeviceError
-            If the device is not open or does not answer.
+            If the device is not open, does not answer, or gives no angle.
         """
         self._needs_to_be_open("read")
-        return self._try("reading", self._read)
+        reading = self._try("reading", self._read)
+        # anything else would end the loop from within, without a ramp
+        if not (
+            isinstance(reading, Reading)
+            and isinstance(reading.time_ns, int)
+            and isinstance(reading.angle, int | float)
+        ):
+            raise DeviceError(
+                f"{self.name}: needs a Reading of a time in ns and an angle, got "
+                f"{reading!r}"
+            )
+        return reading
 
     def command(self, torque_nm: float) -> None:
         """Send a torque, held until the next one.

@@ -28,6 +28,7 @@ _POSITIVE = (
     "arrival_time",
     "standing_time",
     "standing_torque",
+    "actuator_torque",
     "watchdog_time",
 )
 _NOT_NEGATIVE = (
@@ -101,6 +102,9 @@ class DeviceLimits:
         How long any arm may do so while more than this torque is sent, s and N·m; 20
         times as long if it was slower than 4.5 deg/s before, or had settled, which a
         hand that holds it makes it do. The first torque may not be more either.
+    actuator_torque : float, optional
+        How far the torque of a sensor may be from the one that is sent, friction and
+        inertia allowed for, for 50 ms, N·m.
     jump_angle : float, optional
         How far a reading may lie from where the speed before would have it, a tick
         later, rad.
@@ -149,6 +153,7 @@ class DeviceLimits:
     frozen_time: float = 0.010
     standing_time: float = 0.5
     standing_torque: float = 2.0
+    actuator_torque: float = 1.5
     jump_angle: float = math.radians(0.3)
     drift_angle: float = math.radians(3.0)
     drift_speed: float = math.radians(25.0)

@@ -23,17 +23,18 @@ from masrel.errors import (
 from masrel.lab._study_files import Fact
 from masrel.lab.hess._clock import Clock, scheduled
 from masrel.lab.hess._course import Course, PresentationStatus, StretchRules
-from masrel.lab.hess._guard import ActiveGuard, Guard
+from masrel.lab.hess._guard import ActiveGuard, ActuatorGuard, Guard
 from masrel.lab.hess._recorder import Fault, Presented, Samples, as_presented
 from masrel.lab.hess._signals import VelocityEstimate, raised_cosine, speed_margin
 from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.recording import RAMPS
+from masrel.lab.recording import MEASURED_TORQUE, RAMPS
 
 _NONE, _POST_CATCH, _END, _FAULT = range(len(RAMPS))
 
+_FADE_IN_S = 0.1  # of a torque that is asked for before anything moves
 _CHECK_EVERY_S = 0.05  # how often the device is asked for its state
 _BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
 _MAX_DURATION_S = 10.0  # of one stretch
@@ -62,7 +63,8 @@ def run_presentation(
     near where the stretch began. A stretch begins when the arm was extended by
     `arrival_angle`; the next one only after the arm was flexed faster than ν_th, as the
     law has it, or was brought back without a catch. All the while the controller goes
-    on.
+    on. What it asks for before anything moves comes within 100 ms, along a raised
+    cosine.
 
     The presentation is over when one stretch has arrived (``"arrived"``), when the arm
     is brought back after the last of many (``"stretches"``), after the time limit
@@ -266,6 +268,10 @@ class _Ticks:
         self._period_ns = round(1e9 / controller.rate_hz)
         self.guard = Guard(limits, 1.0 / controller.rate_hz)
         self._active_guard = ActiveGuard(limits) if controller.is_guarded else None
+        self._actuator_guard = None
+        if MEASURED_TORQUE in device.channels and not device.is_replay:
+            friction, rate_hz = controller.friction, controller.rate_hz
+            self._actuator_guard = ActuatorGuard(limits, friction, rate_hz)
         self._estimate = VelocityEstimate()
         self._start_ns = self._sent_ns = 0
         self._n_ticks = 0
@@ -273,6 +279,9 @@ class _Ticks:
         self._latest: tuple[float, float, float] | None = None
         self._last_torques: list[float] = []  # torques yet to be sent, last first, N·m
         self._is_ending = False
+        # what is asked for before anything moves, N·m, and the share of it to come
+        self._first = 0.0
+        self._fade_in = iter((1.0, *raised_cosine(_FADE_IN_S, controller.rate_hz)))
 
     def run_to_the_end(self, n_ticks: int) -> tuple[str, Fault | None]:
         """Run ticks -> how they ended, and the fault; the torque is zero afterwards."""
@@ -298,7 +307,7 @@ class _Ticks:
         shares = raised_cosine(self._limits.end_ramp_time, 1e9 / self._period_ns)
         if shares and self._sent != 0.0:
             self._last_torques = [self._sent * share for share in reversed(shares)]
-            self._is_ending = True
+            self._is_ending = self._controller.is_over = True
             self._n_ticks = sys.maxsize
             self._run_from(self._wait_for(tick + 1) if ended else tick)
         return ended or "max-duration"
@@ -359,18 +368,27 @@ class _Ticks:
         guard.speed(velocity)
         controller = self._controller
         torque = self._decide(time_s, angle, velocity) + guard.soft_stop(angle)
+        if not self._samples.n:
+            guard.begins_with(torque)
+            self._first = torque
+        # never beyond zero, where less is asked for by now
+        torque -= next(self._fade_in, 0.0) * sorted((0.0, self._first, torque))[1]
         if self._is_ending:  # whatever the model asks for
             # One share a tick, however late it comes: no fall is steeper than this
             torque = self._last_torques.pop()
         if self._active_guard is not None:
-            acting = torque if self._is_ending else controller.model_torque
+            is_on_the_way = self._is_ending or controller.is_easing
+            acting = torque if is_on_the_way else controller.model_torque
             self._active_guard.check(angle, velocity, acting)
         guard.torque(time_s, torque)
         self._device.command(torque)
-        self._sent = torque
+        held, self._sent = self._sent, torque
         self._sent_ns = now_ns
         if self._samples.channels:
             self._measure(values)
+        if self._actuator_guard is not None:
+            measured = values[self._device.channels.index(MEASURED_TORQUE)]
+            self._actuator_guard.check(time_s, velocity, held, measured)
         eases = _POST_CATCH if controller.is_easing else _NONE
         ramp, stretch = _END if self._is_ending else eases, self._course.stretch
         model, phase = controller.model_torque, controller.phase

@@ -221,6 +221,7 @@ _LATER: dict[str, Any] = {
         "drift_limit_deg": 3.0,
         "drift_speed_deg_s": 25.0,
         "encoder_noise_deg": 0.0,
+        "actuator_limit_nm": 1.5,
         "arrival_deg": 3.0,
         "arrival_speed_deg_s": 5.0,
         "arrival_ms": 100.0,

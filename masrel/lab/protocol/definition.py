@@ -280,6 +280,7 @@ class DeviceSettings(_Table, frozen=True, kw_only=True):
     frozen_limit_ms: Annotated[float, Meta(gt=0, le=100)] = 10.0
     standing_limit_ms: Annotated[float, Meta(gt=0, le=5000)] = 500.0
     standing_torque_nm: Annotated[float, Meta(gt=0, le=28)] = 2.0
+    actuator_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 1.5
     jump_limit_deg: Annotated[float, Meta(gt=0, le=5)] = 0.3
     drift_limit_deg: Annotated[float, Meta(gt=0, le=180)] = 3.0
     drift_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 25.0

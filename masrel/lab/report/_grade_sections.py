@@ -225,12 +225,16 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     )
 
 
+_TOO_SLOW = "Grades of stretches that never reached ν_th are not as intended."
+
+
 def intended_section(material: Material) -> Iterator[Content]:
     """Show how many raters gave each standard model its intended grade."""
     result = material.analysis.intended
     if result is None or not result.models:
         yield lacking(None if result is None else result.reason)
         return
+    made = material.analysis.presentations
     yield Table(
         name="intended",
         caption=f"Raters who gave the intended grade, session {result.session}",
@@ -245,7 +249,10 @@ def intended_section(material: Material) -> Iterator[Content]:
             (row.model, row.intended_grade, row.n_ratings, row.n_agree, row.percent)
             for row in result.models
         ),
-        notes=() if result.reason is None else (f"Mean or SD: {result.reason}.",),
+        notes=(
+            *(() if result.reason is None else (f"Mean or SD: {result.reason}.",)),
+            *(_TOO_SLOW,) * bool(made and made.n_below_threshold),
+        ),
         data=material.data,
     )
     yield Paragraph(

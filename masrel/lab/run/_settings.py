@@ -190,6 +190,7 @@ def device_limits(settings: DeviceSettings) -> DeviceLimits:
         frozen_time=settings.frozen_limit_ms * 1e-3,
         standing_time=settings.standing_limit_ms * 1e-3,
         standing_torque=settings.standing_torque_nm,
+        actuator_torque=settings.actuator_limit_nm,
         jump_angle=math.radians(settings.jump_limit_deg),
         drift_angle=math.radians(settings.drift_limit_deg),
         drift_speed=math.radians(settings.drift_speed_deg_s),

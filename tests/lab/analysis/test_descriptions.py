@@ -38,6 +38,14 @@ def test_a_model_without_ratings_has_no_percentage() -> None:
     assert found.sd == pytest.approx(math.sqrt(5000.0), abs=1e-12)
 
 
+def test_what_was_too_slow_to_be_felt_is_not_as_intended() -> None:
+    first, *others = ratings(*of_session("test", R1=("1",), R2=("1",), R3=("2",))).rows
+    slow = first._replace(felt="below-threshold")
+    rows = dataclasses.replace(ratings(), rows=(slow, *others))
+    hm1 = of_section("intended", rows).models[0]
+    assert (hm1.n_ratings, hm1.n_agree) == (3, 1)
+
+
 def test_of_the_first_session_one_model_has_a_mean_and_no_deviation() -> None:
     found = of_section("intended", ratings(("retest", "R1", "HM1", "1")))
     assert (found.session, found.mean, math.isnan(found.sd)) == ("retest", 100.0, True)

@@ -207,14 +207,20 @@ def law_of(
     model: JointModel, recording: Recording, velocity: np.ndarray | None = None
 ) -> np.ndarray:
     """What a model asks for, N·m, where it is fed what was read (n_samples,)."""
+    return law_and_phases(model, recording, velocity)[0]
+
+
+def law_and_phases(
+    model: JointModel, recording: Recording, velocity: np.ndarray | None = None
+) -> np.ndarray:
+    """The same, and the phases it is in (2, n_samples)."""
     columns = recording.columns
     angle = np.rint(columns["angle_deg"] / 0.005) * radians(0.005)  # as it was read
     if velocity is None:
         velocity = np.radians(columns["velocity_deg_s"])
-    step = model.stepper(START).step
-    return np.array(
-        [step(*now) for now in zip(columns["time_s"], angle, velocity, strict=True)]
-    )
+    joint = model.stepper(START)
+    samples = zip(columns["time_s"], angle, velocity, strict=True)
+    return np.array([(joint.step(*now), joint.phase) for now in samples]).T
 
 
 def same_columns(one: Recording, other: Recording, n: int | None = None) -> bool:

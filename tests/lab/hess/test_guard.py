@@ -166,7 +166,7 @@ def test_what_a_model_may_do_is_no_fault(row: str) -> None:
 def test_a_model_that_gives_no_number_is_a_fault_with_the_ramp(
     value: object, is_passive: bool
 ) -> None:
-    joint = Joint(lambda t, _a, _v: 1.5 if t < 0.1 else value, is_passive=is_passive)
+    joint = Joint(lambda t, _a, _v: 1.5 if t < 0.2 else value, is_passive=is_passive)
     presented = shown(even, joint)
     assert_straight_ramp(presented, "model")
     assert presented.fault.message == (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.elbow import STANDARD_MODELS, JointModel
 from masrel.lab.hess import (
     HandTraits,
     HumanHand,
@@ -19,8 +19,9 @@ from masrel.lab.hess import (
     SimulatedHand,
     open_device,
 )
+from masrel.lab.recording import Recording
 
-from .rig import CATCH, END, MODELS, PRE_CATCH, START, law_of, present
+from .rig import CATCH, END, MODELS, PRE_CATCH, START, law_and_phases, present
 
 PAGE = Path(__file__).parents[3] / "docs" / "explanation" / "driver.md"
 STRETCH = {"start": 0.5, "end": 2.5, "mean_speed": 1.5}
@@ -194,17 +195,29 @@ def outcome(person: Person) -> Outcome:
     """Present to the hand while it holds on, and while it lets go."""
     made = presented(person)
     columns = held_columns(made)
-    law = law_of(STANDARD_MODELS[person.model], made.recording)
-    asked = made.recording.columns["model_torque_nm"]
     phase = columns["phase"]
     return Outcome(
         person=person,
         fault=None if made.fault is None else made.fault.kind,
         lost=bool(made.recording.facts["grip_lost"]),
-        is_law=np.allclose(asked, law, rtol=0.0, atol=1e-9),
+        is_law=_is_law(STANDARD_MODELS[person.model], made.recording),
         recoiled=bool(np.any((phase[:-1] == CATCH) & (phase[1:] == PRE_CATCH))),
         slip_s=_released_after(person, columns),
     )
+
+
+def _is_law(model: JointModel, recording: Recording) -> bool:
+    """Whether the torque is the law's, but where that catches twice in one push.
+
+    The law takes an arm that its catch throws back for one that is flexed, and catches
+    again when the hand goes on; the driver stays before a catch until the arm has been
+    flexed by 5 deg or for 100 ms. The first catch is always both's.
+    """
+    law, phases = law_and_phases(model, recording)
+    asked, phase = (recording.columns[name] for name in ("model_torque_nm", "phase"))
+    begins = (phases == CATCH) & (np.roll(phases, 1) == PRE_CATCH)
+    is_again = (np.cumsum(begins) > 1) & (phases != PRE_CATCH) & (phase == PRE_CATCH)
+    return np.allclose(asked[~is_again], law[~is_again], rtol=0.0, atol=1e-9)
 
 
 def held_columns(made: Presented) -> dict[str, NDArray[np.float64]]:

@@ -17,6 +17,7 @@ from masrel.errors import (
 )
 from masrel.lab.hess import (
     DeviceLimits,
+    Reading,
     RealClock,
     SimulatedClock,
     open_device,
@@ -29,7 +30,9 @@ from .rig import (
     START,
     ActingClock,
     Heard,
+    Joint,
     ScriptedDevice,
+    assert_straight_ramp,
     controls,
     missing,
     present,
@@ -160,7 +163,11 @@ def test_a_fault_brings_the_torque_to_zero_in_a_straight_line(
     assert fault.torque_nm == pytest.approx(1.575)  # sent in the last tick before
     since_s = [time_ns * 1e-9 - fault.time_s for time_ns, _ in device.commands]
     torques = [torque for _, torque in device.commands]
-    zero_s = since_s[torques.index(0.0)]
+    zero_s = next(
+        at_s
+        for at_s, torque in zip(since_s, torques, strict=True)
+        if at_s > -0.1 and torque == 0.0
+    )
     assert zero_s == pytest.approx(ramp_time, abs=1e-9)
     for at_s, torque in zip(since_s, torques, strict=True):
         if 0.0 < at_s < zero_s:
@@ -271,6 +278,27 @@ def test_a_fault_of_the_encoder_leaves_a_recording_that_can_be_written(
 
 
 @pytest.mark.parametrize(
+    "reading", [None, "1.0", (1, 2.0), Reading(0, "2.0"), Reading(0.5, 2.0)]
+)
+def test_what_is_no_reading_is_a_fault_with_the_ramp(reading: object) -> None:
+    def wrong(time_s: float, right: Reading) -> object:
+        return right if time_s < 1.1 else reading
+
+    presented = present(read_fault=wrong)
+    assert_straight_ramp(presented, "device")
+    assert presented.fault.torque_nm > 1.0
+
+
+def test_what_is_faded_in_never_pushes_the_other_way() -> None:
+    joint = Joint(lambda t, _a, _v: 1.5 if t < 0.03 else 0.2, is_passive=True)
+    columns = scripted(model=joint, max_duration_s=0.12)[1].recording.columns
+    torque = columns["command_torque_nm"]
+    assert torque[0] == 0.0
+    assert np.all(torque >= 0.0)
+    np.testing.assert_allclose(torque[100:120], 0.2, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
     ("angle_deg", "pushed_nm"),
     [(183.0, 6.0), (182.5, 5.0), (-2.0, -4.0), (0.0, 0.0), (180.0, 0.0)],
 )
@@ -288,7 +316,9 @@ def test_a_soft_stop_pushes_back_and_the_model_does_not_know(
         )
         columns = presented.recording.columns
         pushed = columns["command_torque_nm"][: presented.recording.n_presented]
-        np.testing.assert_allclose(pushed, expected, rtol=1e-12, atol=1e-12)
+        # all of it after 100 ms, from nothing on
+        np.testing.assert_allclose(pushed[100:], expected, rtol=1e-12, atol=1e-12)
+        assert pushed[0] == 0.0
         np.testing.assert_array_equal(columns["model_torque_nm"], 0.0)
 
 

@@ -60,6 +60,8 @@ def test_it_gives_the_same_torques_bit_for_bit(
     assert again.channels == (MEASURED_TORQUE,)
     assert again.facts["ended"] == first.facts["ended"]
     assert (again.facts["device"], again.facts["simulated"]) == ("replay", True)
+    other = played_back(read, "HM3")  # its torque is not what the sensor measured
+    assert other.facts["ended"] == first.facts["ended"]
 
 
 @pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")

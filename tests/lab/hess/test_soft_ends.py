@@ -162,7 +162,7 @@ def test_a_fault_under_the_ramp_of_an_end_ramps_from_there() -> None:
     ramp = columns["ramp"]
     assert set(ramp) == {0.0, END, FAULT}
     assert np.all(np.diff(ramp) >= 0.0)
-    assert 0.0 < fault.torque_nm < columns["command_torque_nm"][0]
+    assert 0.0 < fault.torque_nm < max(columns["command_torque_nm"])
     assert assert_soft(presented) == 2
 
 

@@ -7,6 +7,8 @@ import pytest
 
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
+    HandTraits,
+    HumanHand,
     PresentationStatus,
     Presented,
     SimulatedHand,
@@ -14,7 +16,7 @@ from masrel.lab.hess import (
 )
 from masrel.lab.recording import stretches
 
-from .rig import END, START, law_of, path, present, scripted
+from .rig import CATCH, END, START, law_of, path, present, scripted
 
 SPEEDS = (radians(92.0), radians(60.0), radians(110.0))
 WAY = {"start": START, "end": END, "mean_speed": SPEEDS[0], "again": SPEEDS[1:]}
@@ -47,6 +49,23 @@ def test_the_law_and_the_column_go_on_through_all_of_them() -> None:
     assert changes.tolist() == [0.0, 1.0, 0.0, 2.0, 0.0, 3.0, 0.0]
     first = int(np.argmax(columns["stretch"] == 1.0))
     assert columns["velocity_deg_s"][first - 1] == 0.0  # from the very first movement
+
+
+@pytest.mark.parametrize(("seed", "rest"), [(20011, 0.3), (20011, 1.0), (7, 1.2)])
+def test_a_soft_hand_that_a_catch_throws_back_is_caught_once_a_push(
+    seed: int, rest: float
+) -> None:
+    # and is held at the joint's end for a second without a fault
+    way = {"start": START, "end": END, "mean_speed": radians(74.44)}
+    again = (radians(114.9), radians(71.47))
+    traits = HandTraits.sample(np.random.default_rng(seed))
+    hand = HumanHand(traits, **way, again=again, returns=True, rest=rest)
+    presented = present("HM4", hand=hand, stretches=StretchRules(n=3))
+    assert presented.fault is None
+    columns = presented.recording.columns
+    begins = np.flatnonzero(np.diff(columns["phase"]) == CATCH) + 1
+    begins = begins[columns["phase"][begins] == CATCH]
+    assert columns["stretch"][begins].tolist() == [1.0, 2.0, 3.0]
 
 
 def test_the_last_stretch_is_held_until_the_arm_is_brought_back() -> None:

@@ -237,6 +237,26 @@ def test_a_kind_is_stretched_held_and_brought_back(kind: str) -> None:
     assert np.sum(far) * 1e-3 > N_STRETCHES * HOLD_S
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_begins_from_nothing_and_gives_up_softly(kind: str) -> None:
+    traits = HandTraits.sample(np.random.default_rng(1001))
+    hand = HumanHand(
+        traits,
+        start=START,
+        end=END,
+        mean_speed=radians(90.0),
+        again=(radians(80.0), radians(100.0)),
+        returns=True,
+        rest=1.0,
+    )
+    presented = present(KINDS[kind], hand=hand, stretches=StretchRules(n=3))
+    torque = presented.recording.columns["command_torque_nm"]
+    assert torque[0] == 0.0
+    assert abs(np.diff(torque[:101])).max() <= 0.25
+    if kind.startswith("clonus"):
+        assert np.diff(torque).min() >= -0.25
+
+
 def test_clonus_beats_as_long_as_even_a_soft_hand_holds_it() -> None:
     (rater,) = raters("clonus that does not fade", [5])
     soft = HandTraits(stiffness=30.0, damping=1.5)

@@ -65,6 +65,7 @@ FIELDS = {
     "frozen_limit_ms": ("frozen_time", 1e-3),
     "standing_limit_ms": ("standing_time", 1e-3),
     "standing_torque_nm": ("standing_torque", 1.0),
+    "actuator_limit_nm": ("actuator_torque", 1.0),
     "jump_limit_deg": ("jump_angle", radians(1.0)),
     "watchdog_ms": ("watchdog_time", 1e-3),
     "ramp_ms": ("ramp_time", 1e-3),
