@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from masrel.errors import MasrelError, ParameterError, ProtocolError
+from masrel.errors import DeviceError, MasrelError, ParameterError, ProtocolError
 from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import echo_remarks, study_argument
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
@@ -29,12 +29,12 @@ def check(study: Path) -> None:
     except ProtocolError as error:
         problems = list(error.problems)
     else:
-        from masrel.lab.run._settings import torque_notes  # loads numpy
+        from masrel.lab.run._settings import device_notes  # loads numpy
 
         problems = [each for checker in _CHECKERS for each in checker(protocol, paths)]
         # What only may happen is for a study of which all else is right.
-        of_models = () if problems else torque_notes(protocol)
-        notes += [f"{paths.protocol}: {note}" for note in of_models]
+        of_device = () if problems else device_notes(protocol)
+        notes += [f"{paths.protocol}: {note}" for note in of_device]
         with contextlib.suppress(MasrelError):  # a checker has said it
             notes += concealment_notes(protocol, paths)
         with contextlib.suppress(MasrelError):
@@ -74,7 +74,7 @@ def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
     try:
         check_backend(protocol)
-    except ParameterError as error:
+    except (ParameterError, DeviceError) as error:
         yield f"{study.protocol}: {error}"
     yield from (f"{study.protocol}: {each}" for each in torque_problems(protocol))
 

@@ -284,6 +284,11 @@ class BusOptions(BackendOptions, ABC):
         )
 
     @property
+    def has_simulated_hand(self) -> bool:
+        """Whether a simulated hand moves an emulated arm, within this process."""
+        return self.interface == "virtual"
+
+    @property
     def is_shared(self) -> bool:
         """Whether another process can join the bus."""
         return self.interface in _SHARED

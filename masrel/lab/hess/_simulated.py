@@ -357,6 +357,19 @@ class SimulatedOptions(BackendOptions):
 
     torque_sensor: TorqueSensor | None = None
 
+    @property
+    def moves_hardware(self) -> bool:
+        """No motor moves."""
+        return False
+
+    @property
+    def has_simulated_hand(self) -> bool:
+        """A simulated hand moves the arm."""
+        return True
+
+
+OPTIONS = SimulatedOptions
+
 
 def _rounded(value: float, step: float) -> float:
     # To the nearest step, where there are steps

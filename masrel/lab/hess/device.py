@@ -77,12 +77,16 @@ class Device(ABC):
     is_replay : bool
         Whether what it measures does not come of the torque that it is sent; False by
         default.
+    holds_torque_when_silent : bool or None
+        Whether it goes on with its last torque when nothing is sent any more, as after
+        a cable comes off. Hardware must say; None, the default, where none moves.
     """
 
     name: ClassVar[str]
     simulated: bool
     channels: tuple[Channel, ...] = ()
     is_replay: bool = False
+    holds_torque_when_silent: bool | None = None
 
     _state: _State = "new"  # on the class, so that `__del__` always finds one
 
@@ -97,11 +101,17 @@ class Device(ABC):
         Raises
         ------
         DeviceError
-            If it was closed before, or cannot be opened.
+            If it was closed before, cannot be opened, or is hardware that does not say
+            whether it holds its torque when nothing is sent.
         """
         if self._state == "closed":
             raise DeviceError(
                 f"{self.name}: needs a new device, this one has been closed"
+            )
+        if not self.simulated and self.holds_torque_when_silent is None:
+            raise DeviceError(
+                f"{self.name}: needs holds_torque_when_silent, True or False: what it "
+                "does with its last torque when nothing is sent any more"
             )
         if self._state == "new":
             self._try("opening", self._start)
@@ -259,9 +269,50 @@ class Device(ABC):
         """Ask an open device for its state; raise `DeviceError` when it is wrong."""
 
 
+# Metadata of an option that is true of one moment, or of a test
+_NOT_A_KEY = {"in_protocol": False}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackendOptions:
-    """What one backend can be told beyond `DeviceSetup`; each has a subclass."""
+    """What one backend can be told beyond `DeviceSetup`; each has a subclass.
+
+    The fields are keys of a protocol's table ``[device.NAME]``, but those whose
+    metadata say ``{"in_protocol": False}``.
+
+    Attributes
+    ----------
+    moves_hardware : bool
+        Whether a motor may move.
+    has_simulated_hand : bool
+        Whether a simulated hand moves the arm.
+    """
+
+    @property
+    def moves_hardware(self) -> bool:
+        """Whether a motor may move; a backend without any says so."""
+        return True
+
+    @property
+    def has_simulated_hand(self) -> bool:
+        """Whether a simulated hand moves the arm."""
+        return False
+
+    def emulated(self, start: float) -> Self:
+        """Return the same for an arm that a simulated hand holds.
+
+        Parameters
+        ----------
+        start : float
+            Where it holds the arm, rad.
+
+        Returns
+        -------
+        BackendOptions
+            These, where nothing has to be emulated.
+        """
+        del start
+        return self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,7 +338,8 @@ class DeviceSetup:
 
 
 # Name to the module whose `build` makes a device of a `DeviceSetup`, not yet open, or
-# raises `DeviceError` when it does not fit; imported when it is chosen. Those of other
+# raises `DeviceError` when it does not fit, and whose `OPTIONS` are the type of its
+# options; imported when it is chosen. Those of other
 # distributions are entry points of the group; none takes a name of these.
 _BACKENDS = {
     "moteus": "masrel.lab.hess.moteus._moteus_device",
@@ -337,6 +389,18 @@ def _backend(name: str) -> Any:
         ) from error
 
 
+def _options_type(name: str) -> type[BackendOptions]:
+    """Return what a device can be told: OPTIONS of its module, if it has any."""
+    options: type[BackendOptions] = getattr(_backend(name), "OPTIONS", BackendOptions)
+    return options
+
+
+def _build_device(name: str, setup: DeviceSetup) -> Device:
+    """Make a device by name, not yet open."""
+    device: Device = _backend(name).build(setup)
+    return device
+
+
 def open_device(
     name: str,
     *,
@@ -382,8 +446,7 @@ def open_device(
     ...     round(device.read().angle, 3)
     0.5
     """
-    device: Device = _backend(name).build(
-        DeviceSetup(clock=clock, hand=hand, range_end=range_end, options=options)
-    )
+    setup = DeviceSetup(clock=clock, hand=hand, range_end=range_end, options=options)
+    device = _build_device(name, setup)
     device.open()
     return device

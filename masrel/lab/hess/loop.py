@@ -160,6 +160,8 @@ def run_presentation(
         "rate_hz": rate_hz,
         "speed_threshold_deg_s": math.degrees(controller.speed_threshold),
     }
+    if device.holds_torque_when_silent is not None:
+        facts["holds_torque_when_silent"] = device.holds_torque_when_silent
     course = Course(
         rules,
         limits,

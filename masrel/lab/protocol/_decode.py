@@ -1,5 +1,6 @@
 """What is wrong with the types of a TOML table, key by key."""
 
+import dataclasses
 import datetime
 import json
 import math
@@ -11,40 +12,65 @@ from difflib import get_close_matches
 
 import msgspec
 from msgspec import inspect
-from msgspec.structs import FieldInfo
 
 _MAX_HINTS = 20
 
 
 def type_problems(
-    raw: Mapping[str, object], struct: type[msgspec.Struct], at: str = ""
+    raw: Mapping[str, object], struct: type, at: str = ""
 ) -> Iterator[str]:
-    """Yield each key of a table that a struct cannot take, as ``key: needed ...``."""
+    """Yield each key of a table that a struct cannot take, as ``key: needed ...``.
+
+    A dataclass may say more when it is made, which is said of the whole table.
+    """
+    fields, reason = _fields(struct), None
     try:
         msgspec.convert(raw, struct)
-    except msgspec.ValidationError:  # of the first problem alone: look key by key
-        pass
+    except msgspec.ValidationError as error:  # of the first problem: look key by key
+        reason = error.__cause__
     else:
-        return
-    fields = {info.encode_name: info for info in msgspec.structs.fields(struct)}
-    prefix = f"{at}." if at else ""
+        if raw.keys() <= fields.keys():
+            return
+    problems = list(_key_problems(raw, fields, f"{at}." if at else ""))
+    yield from problems or [f"{at}: {reason}"]
+
+
+def _key_problems(
+    raw: Mapping[str, object], fields: dict[str, tuple[object, bool]], prefix: str
+) -> Iterator[str]:
     for place, key in enumerate(key for key in raw if key not in fields):
         # what was meant takes long to find, and helps with the first few
         known = fields if place < _MAX_HINTS else {}
         yield _unknown(f"{prefix}{key}", key, known)
-    for key, info in fields.items():
+    for key, (annotation, is_required) in fields.items():
         where = f"{prefix}{key}"
         if key in raw:
-            yield from _value_problems(raw[key], info.type, where)
-        elif info.required:
-            yield f"{where}: needed {_form(info.type, where)}, got none"
+            yield from _value_problems(raw[key], annotation, where)
+        elif is_required:
+            yield f"{where}: needed {_form(annotation, where)}, got none"
+
+
+def _fields(struct: type) -> dict[str, tuple[object, bool]]:
+    # the type of each key, and whether it must be there
+    if not dataclasses.is_dataclass(struct):
+        infos = msgspec.structs.fields(struct)
+        return {info.encode_name: (info.type, info.required) for info in infos}
+    types = typing.get_type_hints(struct, include_extras=True)
+    return {
+        field.name: (
+            types[field.name],
+            field.default is field.default_factory is dataclasses.MISSING,
+        )
+        for field in dataclasses.fields(struct)
+        if field.metadata.get("in_protocol", True)
+    }
 
 
 def _value_problems(value: object, annotation: object, where: str) -> Iterator[str]:
-    array = _array_of(annotation)
+    array, table = _array_of(annotation), _table_of(annotation)
     match value:
-        case Mapping() if _is_struct(annotation):
-            yield from type_problems(value, annotation, where)
+        case Mapping() if table is not None:
+            yield from type_problems(value, table, where)
         case Mapping() if typing.get_origin(annotation) is dict:
             of_value = typing.get_args(annotation)[1]
             for name, item in value.items():
@@ -79,11 +105,11 @@ def _leaf_problems(value: object, annotation: object, where: str) -> Iterator[st
         info = inspect.type_info(annotation)
         options = info.values if isinstance(info, inspect.LiteralType) else ()
         hint = closest(value, map(str, options))
-        needs = "a table" if _is_struct(annotation) else _form(annotation, where)
+        needs = "a table" if _table_of(annotation) else _form(annotation, where)
         yield f"{where}: needed {needs}, got {got(value)}{hint}"
 
 
-def _unknown(where: str, key: str, fields: Mapping[str, FieldInfo]) -> str:
+def _unknown(where: str, key: str, fields: Iterable[str]) -> str:
     hint = closest(key, fields)
     known = "" if hint or not fields else f" ({', '.join(fields)})"
     return f"{where}: needed a known key{known}, got {got(key)}{hint}"
@@ -97,21 +123,31 @@ def closest(value: object, options: Iterable[str]) -> str:
 
 def _form(annotation: object, where: str) -> str:
     array = _array_of(annotation)
-    if _is_struct(annotation):
+    if _table_of(annotation):
         return f"a table [{where}]"
-    if array is not None and _is_struct(array[1]):
+    if array is not None and _table_of(array[1]):
         return f"an array of tables [[{where}]]"
     return needed(annotation)
 
 
-def _is_struct(annotation: object) -> typing.TypeGuard[type[msgspec.Struct]]:
-    return isinstance(annotation, type) and issubclass(annotation, msgspec.Struct)
+def _table_of(annotation: object) -> type | None:
+    # the struct or dataclass that it is, or a union has
+    for member in _members(annotation):
+        if isinstance(member, type) and (
+            issubclass(member, msgspec.Struct) or dataclasses.is_dataclass(member)
+        ):
+            return member
+    return None
+
+
+def _members(annotation: object) -> tuple[object, ...]:
+    is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
+    return typing.get_args(annotation) if is_union else (annotation,)
 
 
 def _array_of(annotation: object) -> tuple[object, object] | None:
     # the array, annotated or not, that it is or a union has, and what its entries are
-    is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
-    for member in typing.get_args(annotation) if is_union else (annotation,):
+    for member in _members(annotation):
         is_annotated = typing.get_origin(member) is typing.Annotated
         bare = typing.get_args(member)[0] if is_annotated else member
         if typing.get_origin(bare) is tuple:

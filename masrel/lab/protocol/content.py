@@ -229,6 +229,7 @@ _LATER: dict[str, Any] = {
         "post_catch_ramp_ms": 100.0,
         "loose_inertia_kg_m2": 0.06,
         "torque_sensor": False,
+        "backends": {},
     },
     "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
     "analysis": {"sample_sizes": (), "judges": (), "estimates": [{"title": ""}]},

@@ -307,6 +307,7 @@ class DeviceSettings(_Table, frozen=True, kw_only=True):
     puck_gear_ratio: _Positive = 18.8
     puck_checks_torque: bool = True
     puck_properties: dict[str, int] | None = None
+    backends: dict[str, dict[str, Any]] = {}  # a table [device.NAME] by its name
 
 
 class SimulatedRaters(_Table, frozen=True, kw_only=True):

@@ -27,7 +27,12 @@ from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.protocol._decode import closest, got, type_problems
 from masrel.lab.protocol._rules import broken_rules, model_rules
 from masrel.lab.protocol.content import _joint_of
-from masrel.lab.protocol.definition import ElbowConstants, Model, Protocol
+from masrel.lab.protocol.definition import (
+    DeviceSettings,
+    ElbowConstants,
+    Model,
+    Protocol,
+)
 from masrel.scales import PUBLISHED_SCALES, PublishedScale
 
 _MAX_PROBLEMS = 200
@@ -69,6 +74,7 @@ def _checked(content: dict[str, object], path: Path) -> Protocol:
         *_resolve_model_files(content, path.parent),
         *_spell_out_scale(content),
     ]
+    _gather_backends(content)
     problems += islice(type_problems(content, Protocol), _MAX_PROBLEMS + 1)
     if not problems:
         protocol = msgspec.convert(content, Protocol)
@@ -120,6 +126,19 @@ def _resolve_model_files(raw: dict[str, object], folder: Path) -> Iterator[str]:
         for key in both:
             yield f"{where}.{key}: needed in {entry['file']} or here, got it in both"
         models[index] = {**filed, **entry, "constants": inline}
+
+
+def _gather_backends(raw: dict[str, object]) -> None:
+    """Put the tables ``[device.NAME]`` together: their keys are the backends' own."""
+    device, known = raw.get("device"), DeviceSettings.__struct_fields__
+    if isinstance(device, Mapping):
+        tables = {
+            key: value
+            for key, value in device.items()
+            if isinstance(value, Mapping) and key not in known
+        }
+        rest = {key: value for key, value in device.items() if key not in tables}
+        raw["device"] = {**rest, "backends": tables} if tables else rest
 
 
 def _write_rater(

@@ -3,7 +3,9 @@
 import bisect
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import replace
+
+import msgspec
 
 from masrel._input import listed
 from masrel.errors import ParameterError
@@ -11,20 +13,19 @@ from masrel.lab.hess import (
     BackendOptions,
     Controller,
     DeviceLimits,
+    DeviceSetup,
     Friction,
     Hand,
+    RealClock,
     SimulatedOptions,
-    TorqueSensor,
     device_names,
 )
 from masrel.lab.hess._guard import HELD_TIMES
 from masrel.lab.hess._signals import passive_damping
+from masrel.lab.hess.device import _build_device, _options_type
 from masrel.lab.protocol import DeviceSettings, Model, Protocol, joint_model
+from masrel.lab.protocol._decode import type_problems
 from masrel.lab.protocol._kinds import DEFAULT_KIND
-
-if TYPE_CHECKING:
-    from masrel.lab.hess.puck import PuckOptions
-
 
 _SPEED_DEG_S = 0.01  # to which speeds are determined that are shown whole
 _PEAK_TO_MEAN = 1.875  # of a stretch with minimum jerk
@@ -41,6 +42,12 @@ def check_backend(protocol: Protocol) -> None:
             f"device.backend: needed one of {', '.join(names)}, "
             f"got {settings.backend!r}"
         )
+    for name in settings.backends:
+        if name not in names:
+            raise ParameterError(
+                f"device.{name}: needed the table of a device, one of "
+                f"{', '.join(names)}, got [device.{name}]"
+            )
     if settings.torque_sensor and settings.backend != "simulated":
         raise ParameterError(
             "device.torque_sensor: needed false, a device of the backend "
@@ -91,9 +98,21 @@ def _torque_problems(protocol: Protocol, model: Model) -> Iterator[str]:
         yield from _stiffness_problems(settings, *joint.largest_slope(speed=speed))
 
 
-def torque_notes(protocol: Protocol) -> Iterator[str]:
-    """Yield where the device stops a model in what raters may well do with it."""
-    # A sentence for each limit that some motion passes
+def device_notes(protocol: Protocol) -> Iterator[str]:
+    """Yield what a device does in silence, and where its limits stop a model."""
+    if moves_hardware(settings := protocol.device):
+        setup = DeviceSetup(clock=RealClock(), options=backend_options(settings))
+        if _build_device(settings.backend, setup).holds_torque_when_silent:
+            yield (
+                f'device.backend: "{settings.backend}" goes on with its last torque '
+                "when nothing is sent any more, as after a cable comes off: have an "
+                "emergency switch in the supply of its motor within reach"
+            )
+    yield from _torque_notes(protocol)
+
+
+def _torque_notes(protocol: Protocol) -> Iterator[str]:
+    # A sentence for each limit that some motion passes in what raters may well do
     settings = protocol.device
     peak = _PEAK_TO_MEAN * protocol.stretch.largest_speed_deg_s
     fastest: dict[str, list[tuple[float, str]]] = {}
@@ -244,45 +263,45 @@ def model_controller(protocol: Protocol, model: str) -> Controller:
 
 def has_simulated_hand(settings: DeviceSettings) -> bool:
     """Return whether a simulated hand moves the arm."""
-    return settings.backend == "simulated" or (
-        settings.backend == "puck" and settings.puck_interface == "virtual"
-    )
+    return backend_options(settings).has_simulated_hand
 
 
 def moves_hardware(settings: DeviceSettings) -> bool:
     """Return whether a motor may move."""
-    if settings.backend != "puck":
-        return settings.backend != "simulated"
-    return _puck_options(settings).moves_hardware
+    return backend_options(settings).moves_hardware
 
 
 def backend_options(
     settings: DeviceSettings, hand: Hand | None = None, seed: int = 0
-) -> BackendOptions | None:
+) -> BackendOptions:
     """Return the options of the backend that a protocol sets; the seed is of noise."""
-    if settings.backend != "puck":
-        if not settings.torque_sensor:
-            return None
-        return SimulatedOptions(torque_sensor=TorqueSensor(seed=seed))
-    options = _puck_options(settings)
+    kind, table = _options_type(settings.backend), _backend_table(settings)
+    where = f"device.{settings.backend}"
+    if problems := list(type_problems(table, kind, where)):
+        raise ParameterError("; ".join(problems))
+    options = msgspec.convert(table, kind)
+    if isinstance(options, SimulatedOptions) and options.torque_sensor is not None:
+        options = replace(
+            options, torque_sensor=replace(options.torque_sensor, seed=seed)
+        )
     return options if hand is None else options.emulated(hand.start)
 
 
-def _puck_options(settings: DeviceSettings) -> "PuckOptions":
-    from masrel.lab.hess.puck import PropertyTable, PuckOptions  # only when chosen
-
-    numbers = settings.puck_properties
-    try:
-        properties = PropertyTable(numbers=numbers) if numbers is not None else None
-    except ParameterError as error:
-        raise ParameterError(f"[device] puck_{error}") from error
-    return PuckOptions(
-        interface=settings.puck_interface,
-        channel=settings.puck_channel,
-        puck=settings.puck_node,
-        direction=settings.puck_direction,
-        gear_ratio=settings.puck_gear_ratio,
-        patience_s=min(0.001, 1.0 / settings.rate_hz),  # no longer than a tick
-        checks_torque=settings.puck_checks_torque,
-        properties=properties,
-    )
+def _backend_table(settings: DeviceSettings) -> dict[str, object]:
+    # the table [device.NAME]; once a puck had keys of [device]
+    former: dict[str, object] = {}
+    if settings.backend == "simulated" and settings.torque_sensor:
+        former = {"torque_sensor": {}}
+    if settings.backend == "puck":
+        former = {
+            "interface": settings.puck_interface,
+            "channel": settings.puck_channel,
+            "puck": settings.puck_node,
+            "direction": settings.puck_direction,
+            "gear_ratio": settings.puck_gear_ratio,
+            "patience_s": min(0.001, 1.0 / settings.rate_hz),  # no longer than a tick
+            "checks_torque": settings.puck_checks_torque,
+        }
+        if settings.puck_properties is not None:
+            former["properties"] = {"numbers": settings.puck_properties}
+    return {**former, **settings.backends.get(settings.backend, {})}

@@ -281,6 +281,18 @@ def test_an_exception_of_a_backend_is_a_fault_of_the_device(
     device.close()
 
 
+def test_hardware_says_what_it_does_with_its_torque_in_silence() -> None:
+    device = ScriptedDevice(SimulatedClock(), simulated=False)
+    with pytest.raises(DeviceError, match="scripted: needs holds_torque_when_silent"):
+        device.open()
+    device.holds_torque_when_silent = False
+    device.open()
+    options = {"clock": device.clock, "limits": LIMITS, "max_duration_s": 0.02}
+    recording = run_presentation(device, controls(), **options).recording
+    assert recording.facts["holds_torque_when_silent"] is False
+    device.close()
+
+
 # Reading
 
 

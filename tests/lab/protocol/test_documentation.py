@@ -68,7 +68,10 @@ def said(field: msgspec.structs.FieldInfo) -> str:
 @pytest.mark.parametrize("heading", TABLES)
 def test_every_key_is_there_with_its_default(heading: str) -> None:
     fields = msgspec.structs.fields(TABLES[heading])
-    assert documented(heading) == {field.name: said(field) for field in fields}
+    # "backends" is no key: it has the tables [device.NAME], whose keys are not ours
+    assert documented(heading) == {
+        field.name: said(field) for field in fields if field.name != "backends"
+    }
 
 
 def test_every_table_of_a_protocol_is_there() -> None:

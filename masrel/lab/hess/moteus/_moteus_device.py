@@ -297,6 +297,7 @@ class MoteusDevice(CanDevice[MoteusOptions]):
     """A moteus on a CAN-FD bus, in torque mode from the first torque on."""
 
     name = "moteus"
+    holds_torque_when_silent = False  # its own watchdog lets go
 
     def __init__(self, setup: DeviceSetup, options: MoteusOptions) -> None:
         super().__init__(setup, options, connected)
@@ -408,6 +409,9 @@ def prepare(interface: str, channel: str, servo: str) -> Callable[[], object]:
     link = options.open_link(clock, accepted=(options.servo << 8,))
     atexit.register(link.close)
     return Servo(link, clock, options).stop
+
+
+OPTIONS = MoteusOptions
 
 
 def build(setup: DeviceSetup) -> MoteusDevice:

@@ -1,12 +1,13 @@
 """What a moteus' backend, and an emulated one, can be told; what its numbers mean."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, Self
 
 from masrel.errors import ParameterError
 from masrel.lab.hess._can import BusOptions, check_direction
 from masrel.lab.hess._emulated import InjectedFault
+from masrel.lab.hess.device import _NOT_A_KEY
 from masrel.lab.hess.limits import _check_positive
 
 # Registers
@@ -127,7 +128,7 @@ class MoteusOptions(BusOptions):
     largest_torque_nm: float = 20.0
     watchdog_ms: float = 20.0
     patience_s: float = 0.001
-    emulator: MoteusEmulatorOptions | None = None
+    emulator: MoteusEmulatorOptions | None = field(default=None, metadata=_NOT_A_KEY)
 
     def __post_init__(self) -> None:
         if not 1 <= self.servo <= 127:

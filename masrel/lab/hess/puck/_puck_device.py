@@ -331,6 +331,7 @@ class PuckDevice(CanDevice[PuckOptions]):
     # turn. The loop does not wait for the replies: they come before the next position.
 
     name = "puck"
+    holds_torque_when_silent = True  # as far as anybody knows
 
     def __init__(self, setup: DeviceSetup, options: PuckOptions) -> None:
         super().__init__(setup, options, connected)
@@ -438,6 +439,9 @@ class PuckDevice(CanDevice[PuckOptions]):
 
     def _idle_arguments(self) -> tuple[int, ...]:
         return self._options.puck, self._puck.torque_id, self._puck.mode_id
+
+
+OPTIONS = PuckOptions
 
 
 def build(setup: DeviceSetup) -> PuckDevice:

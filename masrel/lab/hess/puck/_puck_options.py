@@ -15,6 +15,7 @@ from masrel.errors import DeviceError, ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
 from masrel.lab.hess._can import BusOptions, check_direction
 from masrel.lab.hess._emulated import InjectedFault
+from masrel.lab.hess.device import _NOT_A_KEY
 from masrel.lab.hess.limits import _check_not_negative, _check_positive
 
 GEAR_RATIO = 18.8
@@ -381,9 +382,9 @@ class PuckOptions(BusOptions):
     largest_torque: float = 28.0
     patience_s: float = 0.001
     checks_torque: bool = True
-    angle_after_reset: float | None = None
+    angle_after_reset: float | None = field(default=None, metadata=_NOT_A_KEY)
     properties: PropertyTable | None = field(default=None, repr=False)
-    emulator: EmulatorOptions | None = None
+    emulator: EmulatorOptions | None = field(default=None, metadata=_NOT_A_KEY)
 
     def __post_init__(self) -> None:
         if not 1 <= self.puck <= _MAX_MOTOR_NODE:

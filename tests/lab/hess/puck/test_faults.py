@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import OverrunWarning
-from masrel.lab.hess import Device, open_device
+from masrel.lab.hess import Device, SimulatedOptions, open_device
 from masrel.lab.hess.puck import InjectedFault
 from tests.lab.hess.faults import FaultyDevice
 from tests.lab.hess.injected import N_STRETCHES, Injection, cell, later_s
@@ -216,7 +216,7 @@ def session(injected: InjectedFault, folder: Path) -> SessionOutcome:
     faults = [(injected,)]
 
     def opener(_name: str, *, hand, options, **others) -> Device:
-        assert options is None  # the study's own device is the simulated one
+        assert options == SimulatedOptions()  # the study's own device
         made = puck_options(hand, emulator={"faults": faults.pop() if faults else ()})
         return open_device("puck", hand=hand, options=made, **others)
 

@@ -39,6 +39,7 @@ from masrel.lab.run._settings import (
     backend_options,
     check_backend,
     device_limits,
+    device_notes,
     has_simulated_hand,
     model_controller,
     moves_hardware,
@@ -138,7 +139,7 @@ def test_a_puck_is_told_what_the_protocol_says_of_it() -> None:
         properties=property_table(148),
     )
     assert backend_options(DeviceSettings(backend="puck")) == PuckOptions()
-    assert backend_options(usual) is None
+    assert backend_options(usual) == SimulatedOptions()
     # no answer is waited for longer than a tick
     for rate_hz, patience_s in ((250, 0.001), (2000, 0.0005)):
         options = backend_options(DeviceSettings(backend="puck", rate_hz=rate_hz))
@@ -154,9 +155,54 @@ def test_a_puck_is_told_what_the_protocol_says_of_it() -> None:
     numbers = {**property_table(148).numbers}
     del numbers["MT"]
     with pytest.raises(
-        ParameterError, match=r"^\[device\] puck_properties: need MT too"
+        ParameterError, match=r"^device\.puck\.properties: .*need MT too"
     ):
         backend_options(puck(puck_properties=numbers))
+
+
+def written(path: Path, device: str) -> DeviceSettings:
+    """[device] of the small study, read from its file."""
+    copy_template("small", path)
+    study = StudyPaths(path)
+    text = study.protocol.read_text(encoding="utf-8")
+    text = text.replace('backend = "simulated"\n', device + "\n")
+    study.protocol.write_text(text, encoding="utf-8")
+    return read_protocol(study.protocol).device
+
+
+def test_a_device_has_a_table_of_its_own_in_the_protocol(
+    small: Small, tmp_path: Path
+) -> None:
+    assert backend_options(puck(backends={"puck": {"puck": 4, "channel": "can9"}})) == (
+        dataclasses.replace(backend_options(puck()), puck=4, channel="can9")
+    )
+    # one of another device stays where it is, for the site that has that
+    device = 'backend = "puck"\npuck = { puck = 4, properties = { numbers = %s } }\n'
+    numbers = ", ".join(f"{n} = {k}" for n, k in PUCK["puck_properties"].items())
+    settings = written(
+        tmp_path / "puck",
+        device % f"{{ {numbers} }}" + "simulated = { torque_sensor = { noise = 0.5 } }",
+    )
+    assert backend_options(settings) == PuckOptions(
+        puck=4, properties=property_table(148)
+    )
+    moment = puck(backends={"puck": {"angle_after_reset": 0.5}})
+    with pytest.raises(ParameterError, match=r"device\.puck\.angle_after_reset: "):
+        backend_options(moment)
+    nobodys = DeviceSettings(backends={"nobodys": {}})
+    with pytest.raises(ParameterError, match=r"^device\.nobodys: "):
+        check_backend(msgspec.structs.replace(small[1], device=nobodys))
+    elsewhere = msgspec.structs.replace(settings, backend="simulated")
+    assert backend_options(elsewhere, seed=3) == SimulatedOptions(
+        torque_sensor=TorqueSensor(noise=0.5, seed=3)
+    )
+
+
+def test_what_a_motor_does_in_silence_is_said(small: Small) -> None:
+    of_puck = msgspec.structs.replace(small[1], device=puck())
+    (note, *_), usual = device_notes(of_puck), [*device_notes(small[1])]
+    assert note.startswith('device.backend: "puck" goes on with its last torque')
+    assert not [note for note in usual if "backend" in note]
 
 
 @pytest.mark.parametrize(
