@@ -13,6 +13,7 @@ from masrel.lab.hess.device import (
     DeviceSetup,
     IdleCommand,
     Reading,
+    build_device,
     device_names,
     open_device,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "SimulatedOptions",
     "StretchRules",
     "TorqueSensor",
+    "build_device",
     "cut_off",
     "device_names",
     "open_device",

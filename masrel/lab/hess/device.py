@@ -395,8 +395,27 @@ def _options_type(name: str) -> type[BackendOptions]:
     return options
 
 
-def _build_device(name: str, setup: DeviceSetup) -> Device:
-    """Make a device by name, not yet open."""
+def build_device(name: str, setup: DeviceSetup) -> Device:
+    """Make a device by name, not yet open.
+
+    Parameters
+    ----------
+    name : str
+        One of `device_names`.
+    setup : DeviceSetup
+        What it is made from.
+
+    Returns
+    -------
+    Device
+        A new device; nothing is taken hold of before it is opened.
+
+    Raises
+    ------
+    DeviceError
+        If there is no device of that name or there are several, its module cannot be
+        imported, or the setup does not fit it.
+    """
     device: Device = _backend(name).build(setup)
     return device
 
@@ -447,6 +466,6 @@ def open_device(
     0.5
     """
     setup = DeviceSetup(clock=clock, hand=hand, range_end=range_end, options=options)
-    device = _build_device(name, setup)
+    device = build_device(name, setup)
     device.open()
     return device

@@ -18,11 +18,12 @@ from masrel.lab.hess import (
     Hand,
     RealClock,
     SimulatedOptions,
+    build_device,
     device_names,
 )
 from masrel.lab.hess._guard import HELD_TIMES
 from masrel.lab.hess._signals import passive_damping
-from masrel.lab.hess.device import _build_device, _options_type
+from masrel.lab.hess.device import _options_type
 from masrel.lab.protocol import DeviceSettings, Model, Protocol, joint_model
 from masrel.lab.protocol._decode import type_problems
 from masrel.lab.protocol._kinds import DEFAULT_KIND
@@ -102,7 +103,7 @@ def device_notes(protocol: Protocol) -> Iterator[str]:
     """Yield what a device does in silence, and where its limits stop a model."""
     if moves_hardware(settings := protocol.device):
         setup = DeviceSetup(clock=RealClock(), options=backend_options(settings))
-        if _build_device(settings.backend, setup).holds_torque_when_silent:
+        if build_device(settings.backend, setup).holds_torque_when_silent:
             yield (
                 f'device.backend: "{settings.backend}" goes on with its last torque '
                 "when nothing is sent any more, as after a cable comes off: have an "

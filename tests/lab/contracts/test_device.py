@@ -5,7 +5,7 @@ import importlib.util
 import math
 import pkgutil
 import warnings
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from math import radians
 from pathlib import Path
@@ -17,7 +17,9 @@ from masrel.errors import DeviceError
 from masrel.lab import hess
 from masrel.lab.hess import (
     BackendOptions,
+    Clock,
     Device,
+    DeviceSetup,
     PresentationStatus,
     Presented,
     Reading,
@@ -26,9 +28,15 @@ from masrel.lab.hess import (
     SimulatedOptions,
     StretchRules,
     TorqueSensor,
+    build_device,
     device_names,
     open_device,
     run_presentation,
+)
+from masrel.lab.hess.testing import (
+    CONTRACT,
+    DeviceUnderTest,
+    assert_device_contract,
 )
 from masrel.lab.recording import MEASURED_TORQUE, Channel, Recording, stretches
 from tests.lab.hess.rig import (
@@ -66,19 +74,29 @@ def device_of(
 
     It is told to measure something beside the angle where it can.
     """
+    device = made(backend, setup_of(backend, clock, n_stretches, measures), angle)
+    if backend == "scripted" and measures:
+        device.channels = CHANNELS
+        device.values = lambda time_s: (2.0, 0.1 * time_s, 0.0)
+    device.open()
+    return device
+
+
+def made(backend: str, setup: DeviceSetup, angle=lambda _time_s: START) -> Device:
     if backend == "scripted":
-        device = ScriptedDevice(clock, angle)
-        if measures:
-            device.channels = CHANNELS
-            device.values = lambda time_s: (2.0, 0.1 * time_s, 0.0)
-        device.open()
-        return device
+        return ScriptedDevice(setup.clock, angle)
+    return build_device(backend, setup)
+
+
+def setup_of(
+    backend: str, clock: Clock, n_stretches: int = 1, measures: bool = False
+) -> DeviceSetup:
     options = SENSING if measures else None
     if backend == "replay":  # a recording does not move
         options = ReplayOptions(recording=_recording(options, n_stretches))
     again = (SPEED,) * (n_stretches - 1)
     hand = stretching(90.0, again=again, returns=n_stretches > 1)
-    return open_device(backend, clock=clock, hand=hand, options=options)
+    return DeviceSetup(clock=clock, hand=hand, options=options)
 
 
 NAMES = [*device_names(), "scripted"]
@@ -126,6 +144,80 @@ def _source(module: str) -> str:
     return Path(found.origin).read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("rule", CONTRACT)
+def test_every_device_holds_the_contract(backend: str, rule: str) -> None:
+    CONTRACT[rule](
+        DeviceUnderTest(
+            build=partial(made, backend),
+            setup=lambda: setup_of(backend, SimulatedClock()),
+            controller=controls,
+        )
+    )
+
+
+@pytest.mark.parametrize("backend", MEASURING)
+def test_so_does_one_that_measures_something(backend: str) -> None:
+    def setup() -> DeviceSetup:
+        return setup_of(backend, SimulatedClock(), measures=True)
+
+    build = partial(made, backend)
+    assert_device_contract(
+        DeviceUnderTest(build=build, setup=setup, controller=controls)
+    )
+
+
+class Wrong(ScriptedDevice):
+    """A device that breaks one rule, and may stay open."""
+
+    def __del__(self) -> None:
+        """Nothing is warned of."""
+
+    def __init__(self, rule: str, setup: DeviceSetup) -> None:
+        super().__init__(setup.clock)
+        self.rule, self.simulated = rule, rule != "idle from elsewhere"
+        self.holds_torque_when_silent = True
+        if rule == "a presentation":
+            self.angle = lambda time_s: START + 99.0 * time_s
+
+    def check(self) -> None:
+        if self.rule == "errors are the device's" and self.is_open:
+            self._check()
+        super().check()
+
+    def close(self) -> None:
+        if self.rule == "zero before idle" and self.is_open:
+            self._stop()
+        if self.rule != "ticks without a reading" or not self.n_reads:
+            super().close()
+
+    def command(self, torque_nm: float) -> None:
+        if self.rule == "finite torque only":
+            self._send(torque_nm)
+        super().command(torque_nm)
+
+    def open(self) -> None:
+        if self.rule == "order of states":
+            self._state = "new"
+        super().open()
+
+    def _read(self) -> Reading:
+        reading = super()._read()
+        if self.rule == "readings":
+            return reading._replace(time_ns=self.start_ns)
+        return reading
+
+
+@pytest.mark.parametrize("rule", CONTRACT)
+def test_a_rule_that_is_broken_is_named(rule: str) -> None:
+    of = DeviceUnderTest(
+        build=partial(Wrong, rule),
+        setup=lambda: DeviceSetup(clock=SimulatedClock()),
+        controller=controls,
+    )
+    with pytest.raises(DeviceError, match=f"^{rule}: scripted: "):
+        assert_device_contract(of)
+
+
 # Opening and closing
 
 
@@ -141,19 +233,6 @@ def test_opening_it_again_does_nothing(
     again = opened.read()
     assert again.angle == before.angle  # where it was
     assert again.time_ns >= before.time_ns
-
-
-def test_what_was_closed_stays_closed(opened: Device, backend: str) -> None:
-    opened.close()
-    opened.close()  # does nothing more
-    assert not opened.is_open
-    with pytest.raises(DeviceError, match=f"{backend}: needs a new device"):
-        opened.open()
-    assert not opened.is_open
-    for act in (opened.read, lambda: opened.command(0.0), opened.check):
-        words = f"{backend}: needs an open device to .*, this one is closed"
-        with pytest.raises(DeviceError, match=words):
-            act()
 
 
 def test_a_with_block_gives_the_device_and_closes_it(opened: Device) -> None:
@@ -296,29 +375,6 @@ def test_hardware_says_what_it_does_with_its_torque_in_silence() -> None:
 # Reading
 
 
-def test_a_reading_is_a_time_on_the_clock_and_an_angle_in_the_range(
-    opened: Device, clock: SimulatedClock
-) -> None:
-    tick(clock, 7)
-    asked_ns = clock.now_ns()
-    reading = opened.read()
-    assert isinstance(reading, Reading)
-    assert type(reading.time_ns) is int
-    assert type(reading.angle) is float  # a numpy scalar would slow the loop down
-    assert asked_ns <= reading.time_ns <= clock.now_ns()
-    assert 0.0 <= reading.angle <= math.pi
-
-
-def test_a_later_reading_has_a_later_time(
-    opened: Device, clock: SimulatedClock
-) -> None:
-    times = []
-    for _ in range(5):
-        tick(clock)
-        times.append(opened.read().time_ns)
-    assert times == sorted(set(times))
-
-
 # Channels
 
 
@@ -329,18 +385,6 @@ def measuring(request: pytest.FixtureRequest, clock: SimulatedClock):
     assert bool(device.channels) == bool(channels)
     yield device
     device.close()
-
-
-def test_every_reading_has_a_number_for_each_channel(
-    measuring: Device, clock: SimulatedClock
-) -> None:
-    columns = [channel.column for channel in measuring.channels]
-    assert len(set(columns)) == len(columns)
-    for _ in range(5):
-        tick(clock)
-        values = measuring.read().channels
-        assert len(values) == len(columns)
-        assert all(type(value) is float for value in values)
 
 
 def test_what_it_measures_is_in_the_recording(
@@ -357,24 +401,7 @@ def test_what_it_measures_is_in_the_recording(
 # Its state, and who else can idle it
 
 
-def test_who_else_can_idle_it_is_a_module_that_can(opened: Device) -> None:
-    idle = opened.idle_command()
-    if idle is not None:
-        assert callable(importlib.import_module(idle.module).prepare)
-        assert all(isinstance(argument, str) for argument in idle.arguments)
-
-
 # Commanding
-
-
-@pytest.mark.parametrize("torque", [math.nan, math.inf, -math.inf])
-def test_a_torque_that_is_not_finite_is_refused_and_the_device_stays_open(
-    opened: Device, backend: str, torque: float
-) -> None:
-    with pytest.raises(DeviceError, match=f"{backend}: needs a finite torque, got"):
-        opened.command(torque)
-    assert opened.is_open
-    opened.command(0.0)
 
 
 @with_arm
