@@ -22,6 +22,8 @@ TO_CONSOLE, FROM_CONSOLE, POLL = 0x40, 0x41, 0x42
 _PADDING = 0x50
 _NOT_REGISTERS = (WRITE_ERROR, READ_ERROR, TO_CONSOLE, FROM_CONSOLE, POLL)
 
+COUNTER = 0x070  # of milliseconds; the one whose most negative number is a number
+
 INT8, INT16, INT32, FLOAT = range(4)  # of what type the values of registers are
 _FORMATS = ("b", "h", "i", "f")  # of `struct`
 _MOST_NEGATIVE = (-(2**7), -(2**15), -(2**31))  # which integers mean nan
@@ -63,7 +65,7 @@ def write(kind: int, first: int, *values: float) -> Subframe:
 
 def value_of(register: int, kind: int, raw: float) -> float:
     """Return what a register's number on the bus stands for, in SI but for turns."""
-    if kind == FLOAT:
+    if kind == FLOAT or register == COUNTER:
         return raw
     if raw == _MOST_NEGATIVE[kind]:
         return math.nan
@@ -72,7 +74,7 @@ def value_of(register: int, kind: int, raw: float) -> float:
 
 def raw_of(register: int, kind: int, value: float) -> float:
     """Return a register's number on the bus, clipped to what the type can hold."""
-    if kind == FLOAT:
+    if kind == FLOAT or register == COUNTER:
         return value
     if math.isnan(value):
         return _MOST_NEGATIVE[kind]

@@ -35,6 +35,7 @@ from masrel.lab.hess._clock import Clock, RealClock
 from masrel.lab.hess.device import DeviceSetup, Reading
 from masrel.lab.hess.moteus._frames import (
     CONSOLE,
+    COUNTER,
     FLOAT,
     INT8,
     POLL,
@@ -52,7 +53,6 @@ from masrel.lab.hess.moteus._moteus_emulator import connected
 from masrel.lab.hess.moteus._moteus_options import (
     CODE,
     COMMAND,
-    COUNTER,
     DRIVEN,
     FAULT,
     FAULTS,

@@ -16,6 +16,7 @@ from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.moteus._frames import (
     ANSWER,
     CONSOLE,
+    COUNTER,
     FROM_CONSOLE,
     INT8,
     POLL,
@@ -32,7 +33,6 @@ from masrel.lab.hess.moteus._frames import (
 )
 from masrel.lab.hess.moteus._moteus_options import (
     CODE,
-    COUNTER,
     DRIVEN,
     FAULT,
     FEEDFORWARD,
@@ -265,7 +265,7 @@ class MoteusEmulator(EmulatedAmplifier):
                 return Subframe(READ_ERROR, 0, register, _NO_SUCH_REGISTER)
             if register == COUNTER:  # it wraps
                 bits = _COUNTER_BITS[kind]
-                value = (value + 2.0 ** (bits - 1)) % 2.0**bits - 2.0 ** (bits - 1)
+                value = (int(value) + 2 ** (bits - 1)) % 2**bits - 2 ** (bits - 1)
             raws.append(raw_of(register, kind, value))
         return Subframe(ANSWER, kind, first, n, tuple(raws))
 

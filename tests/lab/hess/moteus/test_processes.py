@@ -7,14 +7,15 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from math import degrees
+from math import degrees, radians
 
 import pytest
 
 from masrel.errors import BusError
-from masrel.lab.hess import RealClock, open_device
+from masrel.lab.hess import DeviceLimits, RealClock, open_device, run_presentation
 from masrel.lab.hess.moteus import MoteusOptions, connected
 from tests.lab.hess.moteus.rig import loose
+from tests.lab.hess.rig import END, MODELS, controls
 
 # What is killed: a loop that beats and holds 0.2 N·m
 LOOP = """
@@ -119,3 +120,55 @@ def test_one_in_a_process_of_its_own_is_driven_over_the_bus(
         finally:
             other.send_signal(signal.SIGINT)
         assert other.wait(10.0) == 0
+
+
+# A moteus whose arm a hand stretches, for one presentation of a loop in real time
+SERVED = """
+import sys
+from masrel.lab.hess import RealClock
+from masrel.lab.hess.moteus import MoteusOptions, connected
+from tests.lab.hess.rig import stretching
+
+options = MoteusOptions(interface="udp_multicast", channel=sys.argv[1])
+with connected(options, clock=RealClock(), hand=stretching(92.0)) as link:
+    print("ready", flush=True)
+    link.peer.run(lambda: False)
+"""
+
+
+@pytest.mark.parametrize(
+    "n",
+    [
+        pytest.param(3, marks=pytest.mark.slow),
+        pytest.param(300, marks=pytest.mark.long),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")
+def test_presentations_in_real_time_over_the_bus(
+    options: MoteusOptions, n: int
+) -> None:
+    # No limits on the lateness of a machine that does other things, too
+    late = {"missed_ticks": 10_000, "missed_replies": 20, "missed_replies_per_100": 100}
+    late |= {"stale_time": 0.05, "watchdog_time": 0.1, "jump_angle": radians(5.0)}
+    limits = DeviceLimits(**late, torque_rate=1e6, speed=radians(5000.0))
+    missed = []
+    for number in range(n):
+        command = [sys.executable, "-c", SERVED, options.channel]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as other:
+            try:
+                assert other.stdout is not None
+                assert other.stdout.readline() == "ready\n"
+                clock = RealClock()
+                with open_device("moteus", clock=clock, options=options) as device:
+                    done = run_presentation(
+                        device,
+                        controls(MODELS[number % 4]),
+                        clock=clock,
+                        limits=limits,
+                        end_angle=END,
+                    )
+            finally:
+                other.kill()
+        assert done.fault is None, (number, done.fault)
+        missed.append(done.n_missed_ticks)
+    print(f"missed ticks in {n} presentations: {sum(missed)}, at most {max(missed)}")

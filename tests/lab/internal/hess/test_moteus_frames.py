@@ -238,7 +238,6 @@ def test_what_is_no_frame_or_fits_in_none_is_refused(act, words: str) -> None:
         (0x023, (1 / 127, 1 / 32767, 1 / 2147483647)),
         (0x025, (0.5, 0.01, 0.001)),
         (0x027, (0.01, 0.001, 0.000001)),
-        (0x070, (1, 1, 1)),
     ],
 )
 def test_integers_are_scaled(register: int, scales: tuple[float, ...]) -> None:
@@ -250,3 +249,8 @@ def test_integers_are_scaled(register: int, scales: tuple[float, ...]) -> None:
         assert raw_of(register, kind, -1e12) == 1 - most  # the most negative is nan
         assert raw_of(register, kind, nan) == -most
     assert value_of(register, FLOAT, 0.3) == raw_of(register, FLOAT, 0.3) == 0.3
+
+
+def test_the_counter_of_milliseconds_counts_through_its_most_negative() -> None:
+    for kind, most in ((INT8, 2**7), (INT16, 2**15), (INT32, 2**31)):
+        assert value_of(0x070, kind, -most) == raw_of(0x070, kind, -most) == -most
