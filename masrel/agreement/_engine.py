@@ -109,7 +109,7 @@ class Features:
         moves[abs(moves) <= _ROUNDING * abs(parts).max(axis=1)] = 0.0
         moves += more
         u = moves - freq @ moves / n
-        u[abs(u) <= _ROUNDING * abs(moves).max()] = 0.0
+        u[abs(u) <= _ROUNDING * max(abs(parts).max(), abs(moves).max())] = 0.0
         share = 1.0 if population is None else (population - n) / population
         return math.sqrt(share * n / (n - 1) * float(freq @ (u * u)))
 

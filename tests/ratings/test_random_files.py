@@ -279,7 +279,7 @@ def written(draw: st.DrawFn, layout: Layout, options: list[str]) -> tuple[bytes,
     head = draw(st.sampled_from([*HEADS, f"sep={delimiter}\n"]))
     blank = draw(st.integers(0, 9))
     # a lone cell below an empty line, at the end, is a note
-    if blank < len(lines) - (sum(map(bool, layout.rows[-1])) == 1):
+    if blank < len(lines) - 2 * (sum(map(bool, layout.rows[-1])) == 1):
         lines.insert(blank + 1, "")
     if layout.has_header:  # a line may be one of names, or a title
         options += ["--header", str(head.count("\n") + 1)]
