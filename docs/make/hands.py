@@ -1,4 +1,4 @@
-"""What docs/explanation/driver.md says of people's hands: its table and its figure.
+"""The table and the figure of people's hands on the driver's pages.
 
 ``python -m docs.make.hands [HANDS]`` prints the table and draws the figure; a thousand
 hands take some minutes.

@@ -1,7 +1,7 @@
 """The control loop: cost of a tick, speed on a simulated clock, lateness on a real one.
 
 ``python -m docs.make.benchmarks.driver [SECONDS]`` prints what
-docs/explanation/driver.md says, and draws its figures; SECONDS is how long the real
+docs/evidence/driver.md says, and draws its figures; SECONDS is how long the real
 clock runs for each of three loops.
 """
 

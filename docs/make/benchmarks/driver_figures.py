@@ -1,4 +1,4 @@
-"""The figures of docs/explanation/driver.md; everything in them is simulated."""
+"""The figures of docs/evidence/driver.md; everything in them is simulated."""
 
 from collections.abc import Mapping
 from math import radians

@@ -1,6 +1,6 @@
 """At least 25 faults, each put into a session, and what came of it.
 
-``python -m tests.lab.hess.injected`` prints the table of docs/explanation/driver.md.
+``python -m tests.lab.hess.injected`` writes docs/evidence/driver_faults.csv.
 """
 
 import contextlib
@@ -65,6 +65,7 @@ speed_sd_deg_s = 0.0
 PRE, CATCH, POST = 0.4, 0.68, 1.1
 
 N_STRETCHES = 3  # where there are many
+TABLE = pathlib.Path(__file__).parents[3] / "docs/evidence/driver_faults.csv"
 
 
 def later_s(stretch: int, speed_deg_s: float = 92.0) -> float:
@@ -437,7 +438,7 @@ def cell(value: float, digits: int) -> str:
 
 
 def row(made: Outcome) -> str:
-    """One row of the table in docs/explanation/driver.md."""
+    """One row of the table of docs/evidence/driver.md."""
     zero = cell(made.zero_ms, 0)
     if math.isnan(made.zero_ms) and made.kind not in (None, "released", "process"):
         zero = "never"
@@ -451,13 +452,15 @@ def row(made: Outcome) -> str:
         "yes" if made.intact else "no",
         "yes" if made.resumes else "no",
     ]
-    return "| " + " | ".join(cells) + " |"
+    return ",".join(cells)
 
 
 def main() -> None:
+    lines = [TABLE.read_text(encoding="utf-8").splitlines()[0]]
     for injection in injections():
         with tempfile.TemporaryDirectory() as folder:
-            print(row(outcome(injection, pathlib.Path(folder) / "study")))
+            lines.append(row(outcome(injection, pathlib.Path(folder) / "study")))
+    TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -283,7 +283,7 @@ def test_after_a_slip_the_torque_is_that_of_pre_catch_and_the_arm_slow_enough(
             after = columns["time_s"] > slip_s
             released = int(np.flatnonzero(after & (columns["phase"] == PRE_CATCH))[0])
             at_end = columns["angle_deg"][columns["time_s"] < slip_s + 0.02].max() > 143
-            # docs/explanation/driver.md says so
+            # docs/evidence/driver.md says so
             most_ms = 29.0 if at_end else 10.0
             assert (columns["time_s"][released] - slip_s) * 1e3 <= most_ms
             # From then on it is (1), and never anything else

@@ -1,4 +1,4 @@
-"""What docs/explanation/driver.md says is what the driver does."""
+"""What docs/reference/driver.md says is what the driver does."""
 
 import csv
 import re
@@ -15,7 +15,7 @@ from .rig import END, START
 
 STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
 DOCS = Path(__file__).parents[3] / "docs"
-PAGE = (DOCS / "explanation/driver.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "reference/driver.md").read_text(encoding="utf-8")
 
 
 def table_5() -> list[tuple[str, float]]:

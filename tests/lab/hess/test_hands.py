@@ -23,7 +23,7 @@ from masrel.lab.recording import Recording
 
 from .rig import CATCH, END, MODELS, PRE_CATCH, START, law_and_phases, present
 
-PAGE = Path(__file__).parents[3] / "docs" / "explanation" / "driver.md"
+DOCS = Path(__file__).parents[3] / "docs"
 STRETCH = {"start": 0.5, "end": 2.5, "mean_speed": 1.5}
 CALM = HandTraits(stiffness=30.0, damping=1.5, inertia=0.06, tremor=0.0)
 
@@ -74,7 +74,8 @@ def test_a_drawn_hand_lies_within_the_ranges_of_the_page() -> None:
     rng = np.random.default_rng(4)
     drawn = [HandTraits.sample(rng) for _ in range(300)]
     assert drawn[0] == HandTraits.sample(np.random.default_rng(4))
-    page = PAGE.read_text(encoding="utf-8").partition("| least to largest |")[2]
+    page = (DOCS / "reference/driver.md").read_text("utf-8")
+    page = page.partition("| least to largest |")[2]
     rows = [line.split("|") for line in page.splitlines()[2:9]]
     made = {
         "stiffness": [traits.stiffness for traits in drawn],
@@ -322,6 +323,6 @@ def test_soft_hands_are_told_from_lost_grips(n: int, seed: int) -> None:
 def test_a_thousand_hands_are_told_from_lost_grips() -> None:
     outcomes = [outcome(person) for person in people(1000, seed=0)]
     assert_told_apart(outcomes)
-    page = PAGE.read_text(encoding="utf-8")
+    page = (DOCS / "evidence/driver.md").read_text("utf-8")
     for low, high in (*BANDS, (10.0, 600.0)):
         assert row(low, high, outcomes) in page
