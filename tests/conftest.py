@@ -30,7 +30,7 @@ def masrel(
 def faults(
     request: pytest.FixtureRequest, record_property: Callable[[str, object], None]
 ) -> Iterator[Faults]:
-    """Counts of injected faults; whole ones go into docs/development/long_tests.md."""
+    """Counts of injected faults; whole ones go into docs/evidence/long_tests.md."""
     counts = Faults()
     yield counts
     if request.node.get_closest_marker("faults"):

@@ -1,6 +1,6 @@
 """Faults injected and survived: ``python -m tests.faults`` runs and counts all.
 
-The counts go into ``docs/development/long_tests.md``, with date and commit.
+The counts go into ``docs/evidence/long_tests.md``, with date and commit.
 """
 
 import subprocess

@@ -1,7 +1,7 @@
 """The page of the last run by hand of every slow and long test.
 
 ``python -m docs.make.long_tests JUNIT_XML`` writes the table of tests on
-``docs/development/long_tests.md`` and the counts of injected faults;
+``docs/evidence/long_tests.md`` and the counts of injected faults;
 ``python -m tests.mutants`` writes the table of deliberate faults.
 """
 
@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree
 
-PAGE = Path(__file__).parents[1] / "development" / "long_tests.md"
+PAGE = Path(__file__).parents[1] / "evidence" / "long_tests.md"
 RECORD = Path(__file__).parents[1] / "evidence" / "record.md"
 TESTS = "<!-- table of tests -->\n", "<!-- end of the tests -->\n"
 FAULTS = "<!-- counts of faults -->\n", "<!-- end of the counts -->\n"

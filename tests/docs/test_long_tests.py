@@ -1,4 +1,4 @@
-"""Every safety test in docs/development/long_tests.md is there under its name."""
+"""Every safety test in docs/evidence/long_tests.md is there under its name."""
 
 import ast
 import re
@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 LISTED = re.findall(
     r"(?m)^\| `(tests/[\w/]+\.py)::(\w+)` \|",
-    (ROOT / "docs/development/long_tests.md").read_text(encoding="utf-8"),
+    (ROOT / "docs/evidence/long_tests.md").read_text(encoding="utf-8"),
 )
 
 

@@ -1,7 +1,7 @@
 """Put in one fault after the other, and run the tests that must fail.
 
 ``python -m tests.mutants [WORD ...]`` runs all, or those with a word in their names, on
-copies, and writes the results into ``docs/development/long_tests.md``.
+copies, and writes the results into ``docs/evidence/long_tests.md``.
 """
 
 import importlib.util
