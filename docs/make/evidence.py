@@ -10,7 +10,7 @@ FIGURES = Path(__file__).parents[1] / "figures"
 
 
 def write_rows(name: str, rows: Sequence[Mapping[str, object]]) -> None:
-    """Write rows beside the pages, as ``NAME.csv``; floats have four digits."""
+    """Write rows beside the pages, as ``NAME.csv``; long floats have four digits."""
     path = EVIDENCE / f"{name}.csv"
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
@@ -35,7 +35,8 @@ def _cells(line: str) -> list[str]:
 
 
 def _cell(value: object) -> object:
-    return f"{value:.4g}" if isinstance(value, float) else value
+    is_long = isinstance(value, float) and len(repr(value)) > 8
+    return f"{value:.4g}" if is_long else value
 
 
 def table(

@@ -1,21 +1,20 @@
 """How often tests of a judge reject what is true, and what is not.
 
-``python -m docs.make.judge_levels`` writes ``docs/evidence/judges_levels.csv``, its
-section of ``docs/evidence/judges.md`` and ``docs/figures/judges_levels.png``.
+``python -m docs.make.judge_levels`` writes ``docs/evidence/judges_levels.csv`` and
+``docs/figures/judges_levels.png``.
 """
 
-import csv
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from docs.make.evidence import EVIDENCE, FIGURES, write_rows
 from masrel.agreement import benjamini_yekutieli
 from masrel.judges import PairedTest
 from masrel.judges._paired import (
@@ -30,10 +29,7 @@ Row = dict[str, Any]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-DOCS = Path(__file__).parents[1]
-ROWS, PAGE = DOCS / "evidence/judges_levels.csv", DOCS / "evidence/judges.md"
-FIGURE = DOCS / "figures" / "judges_levels.png"
-BEGIN, END = "<!-- levels -->\n", "<!-- end of the levels -->\n"
+ROWS, FIGURE = EVIDENCE / "judges_levels.csv", FIGURES / "judges_levels.png"
 COLUMNS = ("what", "n", "test", "bound", "epsilon", "of", "percent")
 
 TESTS: tuple[PairedTest, ...] = ("exact", "score", "t")
@@ -141,30 +137,6 @@ def _row(*values: Any) -> Row:
     return dict(zip(COLUMNS, (*cell, round(100.0 * float(share), 2)), strict=True))
 
 
-def section(rows: Sequence[Row]) -> str:
-    """Return the section of the page that rows make."""
-    sizes = [
-        [n]
-        + [max(_of(rows, "level", n, t, bound=b)) for b in BOUNDS for t in TESTS]
-        + [_of(rows, "power", n, t, of=of)[0] for of in SHARES for t in TESTS]
-        for n in SIZES
-    ]
-    families = [
-        [m, n, *(_of(rows, "passed", n, t, of=m)[0] for t in TESTS)]
-        for m, n in FAMILIES
-    ]
-    clusters = [
-        [row["of"], row["percent"]] for row in rows if row["what"] == "clusters"
-    ]
-    heads = [f"{t}, {b}" for b in BOUNDS for t in TESTS]
-    heads += [f"power {t}, {of:.0%}" for of in SHARES for t in TESTS]
-    return _TEXT.format(
-        sizes=_table(["items", *heads], sizes),
-        families=_table(["humans", "items", *TESTS], families),
-        clusters=_table(["clusters × items, correlation", "rejected"], clusters),
-    )
-
-
 def _of(
     rows: Sequence[Row], what: str, n: int, test: str, bound: str = "0.05", of: Any = ""
 ) -> list[float]:
@@ -173,11 +145,6 @@ def _of(
     names = ("what", "n", "test", "bound", "of")
     mine = [row for row in rows if [str(row[name]) for name in names] == cell]
     return [float(row["percent"]) for row in mine]
-
-
-def _table(heads: list[str], rows: Sequence[Sequence[Any]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
 
 
 def draw(rows: Sequence[Row]) -> None:
@@ -205,51 +172,15 @@ def draw(rows: Sequence[Row]) -> None:
 
 
 def main() -> None:
-    """Compute and draw; write rows, section and figure."""
+    """Compute and draw; write rows and figure."""
     rows = [
         *exact_rows(sorted({*SIZES, *CURVE})),
         *family_rows(N_STUDIES),
         *cluster_rows(N_STUDIES),
     ]
-    with ROWS.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    text = before + BEGIN + section(rows) + END + rest.partition(END)[2]
-    PAGE.write_text(text, encoding="utf-8")
+    write_rows("judges_levels", rows)
     draw(rows)
 
-
-_TEXT = """\
-A human is better than the judge by just epsilon, so that the hypothesis is true: how
-often is it rejected? These are sums over all outcomes, not simulations. Each is the
-largest for any share of ties, and for an epsilon of .1, .15 or .2, of a human who is
-tested at .05, or at .05/5.5, the first threshold of three humans (in %). Beside it is
-the power at .05 and an epsilon of .1, where the judge is as good as the human and they
-differ on 10 % or 40 % of the items.
-
-- **The exact test keeps its level**, and is the default up to 2500 items of a human.
-- Tango's score test rejects up to 7.1 % at 30 items, and 5.6 % at 300; from 2500 on it
-  is no more than 5.2 %, and the default.
-- The t-test of the paper rejects up to 18 % at 30 items and 12 % at 100. What power it
-  has beyond the others is of that kind.
-
-{sizes}
-
-![True hypotheses rejected, and judges that pass wrongly](../figures/judges_levels.png)
-
-A judge passes if at least half of the humans' hypotheses are rejected. Below, all
-humans grade the same items, are right on 97 % of them, and are all better by just an
-epsilon of .1: how many of 20 000 judges pass (in %, with an error of 0.15 or less)?
-
-{families}
-
-Where items of a cluster share what sets human and judge apart, the test for clusters
-rejects in less than 5 %, too (20 000 studies; epsilon .1, 14 % of the items differ).
-
-{clusters}
-"""
 
 if __name__ == "__main__":
     main()

@@ -1,19 +1,17 @@
 """How often intervals of a judge's rates hold the true one.
 
 ``python -m docs.make.judge_rates`` draws studies and writes
-``docs/evidence/judges_rates.csv``, its section of ``docs/evidence/judges.md`` and
-``docs/figures/judges_rates.png``.
+``docs/evidence/judges_rates.csv`` and ``docs/figures/judges_rates.png``.
 """
 
-import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.evidence import EVIDENCE, FIGURES, write_rows
 from masrel.judges import prediction_powered_mean
 from masrel.judges.rates import (
     _ENOUGH,
@@ -28,10 +26,7 @@ Ends = tuple[Floats, Floats]
 Cell = tuple[Any, ...]
 Row = dict[str, Any]
 
-DOCS = Path(__file__).parents[1]
-ROWS, PAGE = DOCS / "evidence/judges_rates.csv", DOCS / "evidence/judges.md"
-FIGURE = DOCS / "figures" / "judges_rates.png"
-BEGIN, END = "<!-- rates -->\n", "<!-- end of the rates -->\n"
+ROWS, FIGURE = EVIDENCE / "judges_rates.csv", FIGURES / "judges_rates.png"
 
 JUDGES = {  # sensitivity, specificity
     "good": (0.9, 0.9),
@@ -157,30 +152,6 @@ def _row(cell: Cell, method: str, true: float, low: Floats, high: Floats) -> Row
     return dict(zip(COLUMNS, (*cell, method, *numbers), strict=True))
 
 
-def section(rows: Sequence[Row]) -> str:
-    """Return the section of the page that rows make."""
-    of_rates = [row for row in rows if row["judge"] in JUDGES]
-    of_means = [row for row in rows if row["judge"] in GRADES]
-    parts = (_TEXT, _table(of_rates, METHODS), _ABOUT_GRADES)
-    return "\n".join([*parts, _table(of_means, METHODS_OF_GRADES), ""])
-
-
-def _table(rows: Sequence[Row], methods: Mapping[str, str]) -> str:
-    cells: dict[Cell, dict[str, str]] = {}
-    for row in rows:
-        cell = tuple(str(row[name]) for name in COLUMNS[:4])
-        n_held, n_answers = int(row["n_held"]), int(row["n_answers"])
-        # of fewer answers a share says nothing
-        text = f"{100 * n_held / n_answers:.1f}" if n_answers >= 100 else "–"
-        cells.setdefault(cell, {})[row["method"]] = text
-    heads = ["labelled", "judged", "true", "judge", *methods.values()]
-    lines = [heads, ["---"] * len(heads)]
-    lines += [
-        [*cell, *(of[method] for method in methods)] for cell, of in cells.items()
-    ]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def draw(rows: Sequence[Row]) -> None:
     """Draw the coverage of each method by the number of labels, a mark a cell."""
     from matplotlib.figure import Figure
@@ -208,47 +179,11 @@ def draw(rows: Sequence[Row]) -> None:
 
 
 def main() -> None:
-    """Draw the studies; write rows, section and figure."""
+    """Draw the studies; write rows and figure."""
     found = rows() + of_grades()
-    with ROWS.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        table.writeheader()
-        table.writerows(found)
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    text = before + BEGIN + section(found) + END + rest.partition(END)[2]
-    PAGE.write_text(text, encoding="utf-8")
+    write_rows("judges_rates", found)
     draw(found)
 
-
-_TEXT = """\
-Items are drawn from a population with a true rate, a judge with the same errors for all
-grades them, and some that are drawn at random have a label too. The table says of how
-many of 20 000 such studies the 95 % interval holds the true rate (in %, with a Monte
-Carlo error of 0.2 or less at 95 %). A `good` judge has a sensitivity and a specificity
-of .9 and .9, a `middling` one .8 and .7, a `poor` one .65 and .6, a `lenient` one .98
-and .6.
-
-- **PPI++ with padded labels is the default** at every size: it holds the rate in 94 %
-  or more in every cell. To the labelled items it adds z² = 3.84 others, of which human
-  and judge pass a quarter both, a quarter neither, and a quarter each alone; and it
-  takes t.
-- With z or t alone, PPI++ has next to no width where the judge is never wrong in the
-  few labelled items. At a rate of .05 and 10 labels it holds the truth in 40 % or less.
-- Labels alone, padded as well, are as safe, and wider where the judge is good. Of any
-  rate, exactly and not drawn, they hold 94 % or more with 5 to 200 labels.
-- Rogan and Gladen's rate with Lang and Reiczigel's interval is safe but wide. Its
-  column leaves out studies with the note `few_labels`: fewer than 20 labels, or than 5
-  of items that pass or that fail. With so few it may hold the rate in less than 93 %.
-- The naive interval is that of the judge's own rate.
-
-![Coverage by the number of labels](../figures/judges_rates.png)
-"""
-_ABOUT_GRADES = """
-Grades that are numbers have no ends that are known, so that nothing is padded: the
-interval leaves out one labelled item at a time, and takes t. Below, a judge sees grades
-of 1 to 5 with normal noise of SD .6, rounded (2000 studies, error 0.5 at 95 %). With
-fewer than 50 labels the note `few_labels` is attached.
-"""
 
 if __name__ == "__main__":
     main()

@@ -1,23 +1,21 @@
 """Dawid and Skene's model on simulated ratings: coverage of its intervals, recovery.
 
-``python -m docs.make.judge_truth`` writes ``docs/evidence/judges_truth.csv``, and its
-section of ``docs/evidence/judges.md``; it takes some ten minutes.
+``python -m docs.make.judge_truth`` writes ``docs/evidence/judges_truth.csv``; it takes
+some ten minutes.
 """
 
 import csv
 import io
 import warnings
 from dataclasses import astuple, dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.evidence import EVIDENCE
 from masrel.judges import dawid_skene_intervals
 
-DOCS = Path(__file__).parents[1]
-TABLE, PAGE = DOCS / "evidence/judges_truth.csv", DOCS / "evidence/judges.md"
-BEGIN, END = "<!-- truth -->\n", "<!-- end of the truth -->\n"
+TABLE = EVIDENCE / "judges_truth.csv"
 N_SETS, N_RESAMPLES, SEED = 500, 640, 39
 # items of which a share is hard: raters are wrong there in 7 of 10 grades, together
 HARD, WRONG_ON_HARD = 0.2, 0.7
@@ -107,15 +105,6 @@ def row(number: int) -> list[str]:
     return [*map(str, size), *(f"{mean:.3f}" for mean in np.mean(sets, axis=0))]
 
 
-def section(rows: list[list[str]]) -> str:
-    """Return the section of the page: what is simulated, and a line a cell."""
-    titles = "items | raters | accuracy | shares | errors | π | θ, right | θ, wrong"
-    titles += " | items right | by votes | warned"
-    shown = [[*of[:5], *of[6:9], *of[11:]] for of in rows]
-    lines = [TEXT, f"| {titles} |", "|" + " --- |" * 11]
-    return "\n".join([*lines, *(f"| {' | '.join(of)} |" for of in shown), ""])
-
-
 def main() -> None:
     rows = []
     for number in range(len(CELLS)):
@@ -124,29 +113,6 @@ def main() -> None:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([HEAD, *rows])
     TABLE.write_text(text.getvalue(), encoding="utf-8")
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    page = before + BEGIN + section(rows) + END + rest.partition(END)[2]
-    PAGE.write_text(page, encoding="utf-8")
-
-
-TEXT = """\
-500 sets of ratings a row, by raters of one accuracy whose errors fall on the other
-classes alike often. Shown are the shares of the 95 % intervals that hold the true π,
-the chances of the right grade and those of each wrong one; of items whose most probable
-class is the true one, and the same of the majority vote (a tie is split); and of sets
-with a warning. An interval takes 640 draws.
-
-- Where raters are right in 8 of 10 or more, intervals hold in 93 or more of 100, but
-  for π of 200 items by three raters, and right grades of 50 items in four classes (92).
-- Where they are right in 6 or 7 of 10 and tell the classes apart but little, intervals
-  are too short, down to 81 of 100. Of these sets 79 in 100 or more have a warning.
-- There the majority vote finds the class more often than the model does, and so it does
-  with few items: with raters of one accuracy, the model has nothing to weigh.
-- **Where raters err together, nothing shows it.** A fifth of the items are hard, and
-  every rater is wrong on 7 of 10 of these; in all, each is right in 8 of 10, and five
-  are worth two. The intervals of errors hold the truth in 38 of 100 sets, and no set is
-  warned of.
-"""
 
 
 if __name__ == "__main__":
