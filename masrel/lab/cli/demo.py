@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from masrel._files import write_file
+from masrel._files import write_file, write_files
 from masrel.cli._options import OutputOptions, output_options
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.lab.cli._study_options import read_study
@@ -25,8 +25,15 @@ _DAY = datetime(2012, 1, 1, tzinfo=UTC)
     metavar="NAME",
     help="Bundled study to run.  [default: hess2012, and tone after it]",
 )
+@click.option(
+    "--device",
+    type=click.Choice(["simulated", "puck", "moteus"]),
+    default="simulated",
+    show_default=True,
+    help="What presents the models; a puck or a moteus is emulated.",
+)
 @output_options(quiet="No progress bars.")
-def demo(out: Path, template: str | None, output: OutputOptions) -> None:
+def demo(out: Path, template: str | None, device: str, output: OutputOptions) -> None:
     """Run a complete simulated study in OUT and report it, and the published one.
 
     After it comes a small study of other tone than spasticity.
@@ -43,6 +50,8 @@ def demo(out: Path, template: str | None, output: OutputOptions) -> None:
         for folder, name in studies.items():
             study = StudyPaths(out / folder)
             copy_template(name, study.root)
+            if device != "simulated":
+                _emulate(study, device)
             _publish_secret(study)
             _simulate(study, output)
             report = "simulated" if folder == "study" else folder
@@ -54,6 +63,16 @@ def demo(out: Path, template: str | None, output: OutputOptions) -> None:
     click.echo("Open these in a browser:")
     for page in pages:
         click.echo(f"  {page}")
+
+
+def _emulate(study: StudyPaths, device: str) -> None:
+    # an amplifier on a bus inside this process
+    import tomlkit  # nothing else here needs it
+
+    document = tomlkit.parse(study.protocol.read_text(encoding="utf-8"))
+    table = {"interface": "virtual", "channel": "demo"}
+    document.setdefault("device", {}).update({"backend": device, device: table})
+    write_files({study.protocol: tomlkit.dumps(document)})
 
 
 def _publish_secret(study: StudyPaths) -> None:

@@ -20,6 +20,8 @@ from masrel.lab.hess.hand import Hand
 _DUPLICATE_NS = 100_000
 _SOON_NS = 10_000_000  # until it is looked whether it is over
 _BRAKING_STEP_NS = 500_000
+_Event = Callable[[int], None]  # at the time when it was due, ns
+
 _PROTOCOL_ERROR = 0x088  # class of an error frame: protocol violation, bus error
 
 FaultKind = Literal[
@@ -205,24 +207,23 @@ class EmulatedAmplifier(ABC):
         faults: tuple[InjectedFault, ...],
         motor: Motor,
         counts_per_turn: int,
+        address: int,
     ) -> None:
         self.link = link
+        self._address = address
         self._clock = clock
         self.faults = Faults(faults)
         self.motor = motor
         self._counts_per_turn = counts_per_turn
         self._frozen_counts: int | None = None  # at which its encoder stands still
         self._last_reply_ns = 0
-        self._events: list[tuple[int, int, Callable[[int], None]]] = []
+        self._events: list[tuple[int, int, _Event]] = []
         self._n_events = 0
 
     # What is its own
 
     _torn_bytes = 1  # of a frame that is cut short
-
-    @abstractmethod
-    def _is_addressed(self, frame: Frame) -> bool:
-        """Return whether a frame is for it."""
+    _address_mask = -1  # of the bits of an identifier that say for whom it is
 
     @abstractmethod
     def _obey(self, frame: Frame, now_ns: int) -> None:
@@ -280,7 +281,8 @@ class EmulatedAmplifier(ABC):
     # What comes from the bus, and goes to it
 
     def _take_in(self, frame: Frame, now_ns: int) -> None:
-        if frame.is_error or not self._is_addressed(frame) or self._is_cut_off(now_ns):
+        is_addressed = frame.identifier & self._address_mask == self._address
+        if frame.is_error or not is_addressed or self._is_cut_off(now_ns):
             return
         if not self.faults.hit("dropped-requests", now_ns):
             try:
@@ -325,22 +327,27 @@ class EmulatedAmplifier(ABC):
 
     def _begin_faults(self, now_ns: int) -> None:
         # Their time begins with the first torque mode
-        if self.faults.started_ns is None:
-            self.faults.started_ns = now_ns
-            for fault in self.faults.all:
-                self._schedule(fault, now_ns)
+        if self.faults.started_ns is not None:
+            return
+        self.faults.started_ns = now_ns
+        for fault in self.faults.all:
+            begins, ends = self._events_of(fault)
+            if begins is not None:
+                self._at(now_ns + round(fault.start_s * 1e9), begins)
+            if ends is not None and fault.end_s < math.inf:
+                self._at(now_ns + round(fault.end_s * 1e9), ends)
 
-    def _schedule(self, fault: InjectedFault, start_ns: int) -> None:
-        begin_ns = start_ns + round(fault.start_s * 1e9)
-        if fault.kind == "idled":
-            self._at(begin_ns, self._idle)
-        elif fault.kind == "reset":
-            self._at(begin_ns, self._reset)
-        elif fault.kind == "bus-off":
-            self._at(begin_ns, lambda _due: self._report_error(BUS_OFF))
-            if fault.end_s < math.inf:
-                end_ns = start_ns + round(fault.end_s * 1e9)
-                self._at(end_ns, lambda _due: self._report_error(BUS_RESTARTED))
+    def _events_of(self, fault: InjectedFault) -> tuple[_Event | None, _Event | None]:
+        # What happens once, where a fault begins, and where it ends
+        events: dict[str, tuple[_Event, _Event | None]] = {
+            "idled": (self._idle, None),
+            "reset": (self._reset, None),
+            "bus-off": (
+                lambda _due: self._report_error(BUS_OFF),
+                lambda _due: self._report_error(BUS_RESTARTED),
+            ),
+        }
+        return events.get(fault.kind, (None, None))
 
     def _encoder_counts(self, counts: int, now_ns: int) -> int:
         # What a faulty encoder makes of a count

@@ -169,3 +169,19 @@ def test_what_a_moteus_cannot_be_told_is_refused(
     done = masrel("device", *arguments)
     assert done.code == 2
     assert words in done.err
+
+
+@pytest.mark.slow
+def test_the_whole_flow_runs_on_an_emulated_moteus(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    done = masrel("demo", out, "--study", "small", "--device", "moteus", "--quiet")
+    assert done.code == 0, done.err
+    facts = [
+        json.loads(file.read_text(encoding="utf-8"))
+        for file in sorted(out.glob("study/sessions/*/*.json"))
+    ]
+    assert len(facts) == 8
+    assert {one["device"] for one in facts} == {"moteus"}
+    assert all(one["simulated"] and one["fault"] is None for one in facts)

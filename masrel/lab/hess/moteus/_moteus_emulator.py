@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from masrel.lab.hess._can import Frame, Link
 from masrel.lab.hess._clock import Clock
-from masrel.lab.hess._emulated import EmulatedAmplifier, InjectedFault, Motor
+from masrel.lab.hess._emulated import EmulatedAmplifier, InjectedFault, Motor, _Event
 from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.moteus._frames import (
     ANSWER,
@@ -74,6 +74,7 @@ class MoteusEmulator(EmulatedAmplifier):
     """A moteus."""
 
     _torn_bytes = 8  # so that more than padding is lost
+    _address_mask = 0xFF
 
     def __init__(
         self,
@@ -91,6 +92,7 @@ class MoteusEmulator(EmulatedAmplifier):
             faults=emulation.faults,
             motor=Motor(hand, range_end),
             counts_per_turn=_COUNTS_PER_TURN,
+            address=options.servo,
         )
         self._options = options
         self._home_state = emulation.home_state
@@ -111,9 +113,6 @@ class MoteusEmulator(EmulatedAmplifier):
         self.torques: deque[tuple[int, float]] = deque([(0, 0.0)], maxlen=_MAX_KEPT)
 
     # What comes from the bus
-
-    def _is_addressed(self, frame: Frame) -> bool:
-        return frame.identifier & 0xFF == self._options.servo
 
     def _obey(self, frame: Frame, now_ns: int) -> None:
         subframes = decode(frame.data)
@@ -228,12 +227,11 @@ class MoteusEmulator(EmulatedAmplifier):
 
     # What goes wrong by itself
 
-    def _schedule(self, fault: InjectedFault, start_ns: int) -> None:
-        super()._schedule(fault, start_ns)
-        if fault.kind == "board-fault":
-            begin_ns = start_ns + round(fault.start_s * 1e9)
-            code = round(fault.amount)
-            self._at(begin_ns, lambda due: self._let_go(FAULT, due, code=code))
+    def _events_of(self, fault: InjectedFault) -> tuple[_Event | None, _Event | None]:
+        if fault.kind != "board-fault":
+            return super()._events_of(fault)
+        code = round(fault.amount)
+        return (lambda due: self._let_go(FAULT, due, code=code)), None
 
     def _idle(self, now_ns: int) -> None:
         self._let_go(STOPPED, now_ns)

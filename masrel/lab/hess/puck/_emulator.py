@@ -87,6 +87,7 @@ class PuckEmulator(EmulatedAmplifier):
             faults=options.faults,
             motor=Motor(hand, range_end),
             counts_per_turn=options.counts_per_turn,
+            address=puck,  # as the host is node 0
         )
         self._transmission = Transmission(
             counts_per_turn=options.counts_per_turn,
@@ -122,10 +123,6 @@ class PuckEmulator(EmulatedAmplifier):
         return self._transmission.counts(self.motor.angle(now_ns))
 
     # What comes from the bus
-
-    def _is_addressed(self, frame: Frame) -> bool:
-        # A frame of the host to one puck has its number: the host is node 0
-        return frame.identifier == self._puck
 
     def _obey(self, frame: Frame, now_ns: int) -> None:
         if self._is_waking:
