@@ -137,12 +137,12 @@ def setup(app: Sphinx) -> None:
 
 
 def _read(app: Sphinx, name: str, source: list[str]) -> None:
-    del app
     file, text = DOCS / f"{name}.md", source[0]
     if not file.exists():
         return
     if shown := re.search(r"^The site shows \[.*\]\((.*)\) here\.$", text, re.M):
         origin = file.parent / shown[1]
+        app.env.note_dependency(str(origin))
         text = origin.read_text("utf-8")
         text = _LINK.sub(lambda link: _rebased(link, origin, file), text)
     text = _LINK.sub(lambda link: _inside(link, file), text)
