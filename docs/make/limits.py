@@ -1,22 +1,21 @@
 """How often intervals of limits of agreement with repeats hold the true ones.
 
 ``python -m docs.make.limits`` draws studies and writes
-``docs/evidence/limits_coverage.csv``, its section of
-``docs/reference/coefficients/limits_with_repeats.md``, and the figure of that page.
+``docs/evidence/limits_coverage.csv``, and the figure of
+``docs/reference/coefficients/limits_with_repeats.md``.
 """
 
-import csv
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from docs.make.evidence import EVIDENCE, FIGURES, write_rows
 from masrel.agreement import (
     limits_by_clusters,
     limits_with_mean,
@@ -26,18 +25,14 @@ from masrel.estimates import Interval
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 
-DOCS = Path(__file__).parents[1]
-ROWS = DOCS / "evidence" / "limits_coverage.csv"
-PAGE = DOCS / "reference" / "coefficients" / "limits_with_repeats.md"
-FIGURE = DOCS / "figures" / "limits_with_repeats.png"
-BEGIN, END = "<!-- coverage -->\n", "<!-- end of the coverage -->\n"
+ROWS = EVIDENCE / "limits_coverage.csv"
+FIGURE = FIGURES / "limits_with_repeats.png"
 COLUMNS = ("limits", "repeats", "n_items", "errors", "quantity", "n_studies", "n_held")
 SIZES, N_STUDIES, SEED, Z = (10, 20, 50, 100), 2000, 20261130, 1.959963984540054
 BIAS, MEAN, ITEMS, MOVED = 0.3, 50.0, 10.0, 5.0  # the last two are SDs
 # SD of what sets methods (or observers) apart on an item, and of single measurements
 ERRORS = {"of items": (1.0, 0.5), "of repeats": (0.1, 1.0)}
 SLOPE, OBSERVERS, GROWING = 0.1, {"1": 5, "2": 3}, 0.1
-QUANTITIES = ("bias", "limit", "slope")
 KINDS = {
     "constant": ("1", "2", "1 to 4"),
     "varying": ("3",),
@@ -160,22 +155,6 @@ def rows(n_studies: int = N_STUDIES, seed: int = SEED, every: int = 1) -> list[R
     return found
 
 
-def section(found: Sequence[Row]) -> str:
-    """Return the section of the page that rows make."""
-    lines: dict[tuple[str, ...], dict[tuple[str, str], str]] = {}
-    for row in found:
-        share = f"{100 * int(row['n_held']) / int(row['n_studies']):.1f}"
-        line = tuple(str(row[name]) for name in ("limits", "repeats", "n_items"))
-        lines.setdefault(line, {})[row["quantity"], row["errors"]] = share
-    heads = list(product(QUANTITIES, ERRORS))
-    names = ["limits", "repeats", "items", *(f"{of}, {e}" for of, e in heads)]
-    table = [names, ["---"] * len(names)]
-    table += [
-        [*line, *(of.get(head, "–") for head in heads)] for line, of in lines.items()
-    ]
-    return "\n".join([_TEXT, *(f"| {' | '.join(line)} |" for line in table), ""])
-
-
 def figure() -> bytes:
     """Return limits on a line, and those of four observers with their mean."""
     rng = np.random.default_rng(SEED)
@@ -195,38 +174,11 @@ def figure() -> bytes:
 
 
 def main() -> None:
-    """Draw the studies; write rows, section and figure."""
+    """Draw the studies; write rows and figure."""
     found = rows()
-    with ROWS.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        table.writeheader()
-        table.writerows(found)
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    text = before + BEGIN + section(found) + END + rest.partition(END)[2]
-    PAGE.write_text(text, encoding="utf-8")
+    write_rows("limits_coverage", found)
     FIGURE.write_bytes(figure())
 
-
-_TEXT = """\
-Items have true values with a mean of 50 and an SD of 10, methods differ by 0.3, and all
-is normal. `of items`: what sets the methods apart on an item has an SD of 1, a single
-measurement one of 0.5; `of repeats`: 0.1 and 1. The table says of how many of 2000
-studies the 95 % interval holds the true value (in %, with a Monte Carlo error of 0.5;
-both limits count). `line` is taken one SD of the means above their middle, with a slope
-of 0.1; in `spread grows` an error is a tenth of what is measured; `with mean` is of
-five observers who measured once, or three who measured twice; `clusters` of two items
-each in as many clusters as the table has items, which share half of the variance of
-what sets the methods apart, in 500 studies (with an error of 1).
-
-- **Every cell is at 93.6 % or above**, and most are within the Monte Carlo error of
-  95 %.
-- The lowest are limits where items have one to four repeats and nearly all error is of
-  repeats: items' mean differences then vary unequally, of which no sum of mean squares
-  knows. With one to ten repeats it is 91 to 92 %. Intervals have a note there.
-- With the normal quantile in place of t the interval of the bias held it in 92 % with
-  ten items, and in 85 % with four.
-
-"""
 
 if __name__ == "__main__":
     main()

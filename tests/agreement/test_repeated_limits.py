@@ -14,7 +14,7 @@ import pytest
 import statsmodels.api as sm
 from scipy import stats
 
-from docs.make.limits import BEGIN, END, PAGE, ROWS, rows, section
+from docs.make.limits import ROWS, rows
 from masrel.agreement import (
     LimitsWithMean,
     RepeatedLimits,
@@ -308,11 +308,6 @@ def test_what_no_cluster_tells_has_its_reason() -> None:
 
 
 # ---- coverage ----
-
-
-def test_the_page_is_made_from_its_rows() -> None:
-    text = PAGE.read_text("utf-8").partition(BEGIN)[2].partition(END)[0]
-    assert text == section(FOUND)
 
 
 def test_intervals_hold_93_in_100_in_every_cell() -> None:
