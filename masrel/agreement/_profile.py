@@ -96,7 +96,8 @@ def _crossing(above: Callable[[Any], Any], inner: Floats, outer: Floats) -> Floa
     while (below := (far[1] < 0.0) & (abs(far[0]) < _FARTHEST)).any():
         outer = np.where(below, 3.0 * far[0] - 2.0 * near[0], far[0])
         near, far = np.where(below, far, near), at(outer)
-    far[1] = np.maximum(far[1], _TINY)
+    # by rounding either may lie on the other side, at levels near 0
+    near[1], far[1] = np.minimum(near[1], 0.0), np.maximum(far[1], _TINY)
     for _ in range(_HALVES):  # Ridders' rule
         middle = at(0.5 * (near[0] + far[0]))
         reach = np.maximum(np.sqrt(middle[1] ** 2 - near[1] * far[1]), _TINY)
