@@ -134,6 +134,14 @@ class DeviceError(MasrelError, RuntimeError):
     kind: str = "device"
 
 
+class _KindError(DeviceError):
+    """One that is of several kinds."""
+
+    def __init__(self, message: str, kind: str | None = None) -> None:
+        super().__init__(message)
+        self.kind = kind or self.kind
+
+
 class DeviceTimeoutError(DeviceError, TimeoutError):
     """The device did not answer in time."""
 
@@ -152,7 +160,7 @@ class ControllerError(DeviceError):
     kind = "controller"
 
 
-class BusError(DeviceError):
+class BusError(_KindError):
     """The bus between host and device failed.
 
     Parameters
@@ -163,9 +171,7 @@ class BusError(DeviceError):
         How it failed.
     """
 
-    def __init__(self, message: str, kind: str = "bus") -> None:
-        super().__init__(message)
-        self.kind = kind
+    kind = "bus"
 
 
 class FrameError(DeviceError, ValueError):
@@ -174,7 +180,7 @@ class FrameError(DeviceError, ValueError):
     kind = "bad-frame"
 
 
-class IdledError(DeviceError):
+class IdledError(_KindError):
     """The device takes no more torques: somebody idled it, or it stopped itself.
 
     Parameters
@@ -185,12 +191,10 @@ class IdledError(DeviceError):
         Why it is idle.
     """
 
-    def __init__(self, message: str, kind: str = "idled") -> None:
-        super().__init__(message)
-        self.kind = kind
+    kind = "idled"
 
 
-class LimitExceededError(DeviceError):
+class LimitExceededError(_KindError):
     """A safety limit was exceeded and the presentation was stopped.
 
     Parameters
@@ -201,9 +205,7 @@ class LimitExceededError(DeviceError):
         Which limit.
     """
 
-    def __init__(self, message: str, kind: str = "limit") -> None:
-        super().__init__(message)
-        self.kind = kind
+    kind = "limit"
 
 
 class MasrelWarning(UserWarning):

@@ -255,16 +255,17 @@ class Estimate(_Shown):
 
 
 _POPULATIONS: dict[Target, str] = {
-    "items": "other items",
-    "raters": "other raters",
-    "both": "other items and raters",
+    "items": "items",
+    "raters": "raters",
+    "both": "items and raters",
 }
+"""What an interval is for others of, by its target."""
 
 
 def _population(interval: Interval) -> str:
     """Return what an interval generalises to."""
-    is_clustered = interval.unit == "clusters"
-    return "other clusters of items" if is_clustered else _POPULATIONS[interval.target]
+    of_items = "clusters of items" if interval.unit == "clusters" else ""
+    return f"other {of_items or _POPULATIONS[interval.target]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,10 +23,9 @@ from masrel.agreement._labels import (
     label_codes,
     warn_of_texts,
 )
-from masrel.agreement._weights import category_values
+from masrel.agreement._weights import Floats, category_values
 from masrel.errors import CountsError, ParameterError, RatingsError
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _NOTHING = "ratings: needs a table (items, raters) of at least one of each"

@@ -9,11 +9,8 @@ from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from masrel.agreement._engine import Floats
-
-Integers = NDArray[np.int64]
+from masrel.agreement._engine import Floats, Integers
 
 # the columns of each effect, small ones first, to the cell of each rating
 Cells = Mapping[frozenset[str], Integers]

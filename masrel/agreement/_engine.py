@@ -237,13 +237,42 @@ def check_level(level: float, name: str = "level") -> None:
     refuse((not is_level, f"{name}: needs (0, 1), got {shown(level)}"))
 
 
-def logit_ends(share: float, half: float) -> tuple[float, float]:
-    """Return the ends about a share within (0, 1) that are symmetric on the logit."""
-    # half: of the width at the share itself, by the slope of the logit there
+def recorded_generator(
+    rng: np.random.Generator | int | None,
+) -> tuple[np.random.Generator, int | None]:
+    """Return a generator and the seed that repeats it."""
+    if isinstance(rng, np.random.Generator):
+        return rng, None  # its owner knows where it began
+    if rng is None:
+        rng = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
+    is_seed = isinstance(rng, int | np.integer) and not isinstance(rng, bool)
+    needed = "needs a numpy Generator or an integer of at least 0"
+    refuse((not is_seed or rng < 0, f"rng: {needed}, got {rng!r}"))
+    return np.random.default_rng(int(rng)), int(rng)
+
+
+# -- intervals -----------------------------------------------------------------------
+
+
+def student_t(level: float, df: float) -> float:
+    """Return the two-sided quantile of Student's t; that of the normal for inf."""
+    from scipy.special import ndtri, stdtrit  # loaded only when an interval needs it
+
+    upper = 0.5 + 0.5 * level
+    return float(ndtri(upper) if math.isinf(df) else stdtrit(df, upper))
+
+
+def logit_ends(value: float, half: float, lowest: float = 0.0) -> tuple[float, float]:
+    """Return ends about a value that are symmetric on the logit above `lowest`."""
+    # of its place between that and 1; half: of the width at the value itself, which is
+    # divided by the slope of the logit there
     from scipy.special import expit, logit  # loaded only for an interval
 
-    of_logit = half / (share * (1.0 - share))
-    return float(expit(logit(share) - of_logit)), float(expit(logit(share) + of_logit))
+    room = 1.0 - lowest
+    share = (value - lowest) / room
+    of_logit = half / (room * share * (1.0 - share))
+    low, high = expit([logit(share) - of_logit, logit(share) + of_logit]).tolist()
+    return lowest + room * low, lowest + room * high
 
 
 def undefined(title: str, reason: str) -> str:

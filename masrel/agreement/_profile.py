@@ -10,10 +10,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri, expit
 
-Floats = NDArray[np.float64]
+from masrel.agreement._engine import Floats
 
 EXACT = 1e-15
 """Residual sum of squares, as a share of all, that is as good as a perfect fit."""

@@ -17,7 +17,6 @@ from masrel._input import listed, refuse, shown
 from masrel.agreement._codes import check_frame, levels, numbers
 from masrel.agreement._effects import (
     Cells,
-    Integers,
     expected_squares,
     jackknife_draws,
     mean_squares,
@@ -25,7 +24,13 @@ from masrel.agreement._effects import (
     pivotal_draws,
     told_together,
 )
-from masrel.agreement._engine import Floats, check_level, deviations
+from masrel.agreement._engine import (
+    Floats,
+    Integers,
+    check_level,
+    deviations,
+    recorded_generator,
+)
 from masrel.agreement.decision import DStudy, d_study
 from masrel.errors import RatingsError
 from masrel.estimates import Interval
@@ -277,14 +282,7 @@ def g_study(
     nested = dict(nested or {})
     _check_design(of, facets, nested, fixed)
     check_level(level)
-    seed = None if isinstance(rng, np.random.Generator) else rng
-    refuse(
-        (
-            seed is not None and (not isinstance(seed, int | np.integer) or seed < 0),
-            f"rng: needs a numpy Generator or an integer of at least 0, got {rng!r}",
-        )
-    )
-    generator = np.random.default_rng(rng)
+    generator, seed = recorded_generator(rng)
     values, codes = _read(data, (of, *facets), grade)
     effects = _effects_of(of, facets, nested)
     cells = _cells(codes, effects, len(values))

@@ -25,6 +25,7 @@ from masrel.agreement._engine import (
     deviations,
     logit_ends,
     measured,
+    student_t,
     tested,
     undefined,
 )
@@ -842,11 +843,9 @@ def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, float, str | 
 
 def _w_interval(w: float, error: float, n: int, level: float) -> Interval:
     """Return an interval symmetric on the logit."""
-    from scipy.special import stdtrit
-
     is_inside, low, high = 0.0 < w < 1.0 and error > _ROUNDING, math.nan, math.nan
     if is_inside:
-        low, high = logit_ends(w, float(stdtrit(n - 1, 0.5 + 0.5 * level)) * error)
+        low, high = logit_ends(w, student_t(level, n - 1) * error)
     return Interval(
         low=low,
         high=high,

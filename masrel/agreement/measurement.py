@@ -23,6 +23,7 @@ from masrel.agreement._engine import (
     check_level,
     deviations,
     measured,
+    student_t,
     undefined,
 )
 from masrel.agreement._labels import Label
@@ -593,17 +594,14 @@ def _interval(
     if reason is None and abs(value) < 1.0:
         z = math.atanh(value)
         if k == 2:
-            quantile = NormalDist().inv_cdf(0.5 + 0.5 * level)
-            width = quantile * error / (1.0 - value**2)
+            normal = NormalDist()
+            width = normal.inv_cdf(0.5 + 0.5 * level) * error / (1.0 - value**2)
         else:
-            from scipy.special import stdtrit
-
             limit = np.nextafter(1.0, 0.0)  # without an item all may be perfect
             each = np.arctanh(np.clip(without, -limit, limit))
             if np.isnan(each).any():
                 reason = "undefined with one item left out: all ratings are the same"
-            quantile = float(stdtrit(n - 1, 0.5 + 0.5 * level))
-            width = quantile * math.sqrt((n - 1) * float(each.var()))
+            width = student_t(level, n - 1) * math.sqrt((n - 1) * float(each.var()))
         low, high = math.tanh(z - width), math.tanh(z + width)
     return Interval(
         low=low,

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from masrel._input import check_option, refuse
 from masrel.agreement._codes import check_frame, levels, numbers, rated_part
-from masrel.agreement._engine import Floats, check_level, divide, undefined
+from masrel.agreement._engine import (
+    Floats,
+    check_level,
+    divide,
+    student_t,
+    undefined,
+)
 from masrel.agreement.measurement import (
     _CHANGE,
     _ROUNDING,
@@ -376,9 +382,7 @@ def _around(
     ends: Interval, value: float, error: float, df: float, kind: str, reason: str | None
 ) -> Interval:
     """Return the interval by Student's t, in other things like one."""
-    from scipy.special import stdtrit  # loaded only for an interval
-
-    half = float(stdtrit(df, 0.5 + 0.5 * ends.level)) * error
+    half = student_t(ends.level, df) * error
     return replace(
         ends,
         low=value - half,
@@ -660,24 +664,23 @@ def _exponential(ends: Interval) -> Interval:
 def _left_out(rows: list[list[float]], level: float) -> list[Interval]:
     """Return intervals of numbers, from those of all rows and without each cluster."""
     # of rows, each with the numbers of all and of one cluster less
-    from scipy.special import stdtrit  # loaded only for an interval
-
-    of_all, without = np.array(rows[0]), np.array(rows[1:])
-    n = len(without)
-    errors = np.sqrt((n - 1) * without.var(axis=0))  # (n - 1)/n Σ (θ_i - mean)²
-    halves = float(stdtrit(n - 1, 0.5 + 0.5 * level)) * errors
+    n = len(rows) - 1
+    errors = np.sqrt((n - 1) * np.var(rows[1:], axis=0))  # (n - 1)/n Σ (θ_i - mean)²
+    ends = Interval(
+        low=math.nan,
+        high=math.nan,
+        level=level,
+        kind="confidence",
+        method="",
+        target="items",
+        unit="clusters",
+        units_are="left out",
+    )
     why = "with one of the clusters left out it is undefined"
     return [
-        Interval(
-            low=low,
-            high=high,
-            level=level,
-            kind="confidence",
-            method=f"cluster jackknife, t({n - 1})",
-            target="items",
-            unit="clusters",
-            units_are="left out",
-            reason=why if math.isnan(low) else None,
+        _around(
+            *(ends, value, error, n - 1, "cluster jackknife, "),
+            why if math.isnan(value + error) else None,
         )
-        for low, high in zip(of_all - halves, of_all + halves, strict=True)
+        for value, error in zip(rows[0], errors.tolist(), strict=True)
     ]

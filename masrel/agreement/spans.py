@@ -20,6 +20,7 @@ from masrel.agreement._engine import (
     check_level,
     divide,
     logit_ends,
+    student_t,
     undefined,
 )
 from masrel.agreement._labels import Label, coded, columns_of, is_missing
@@ -244,20 +245,17 @@ def _estimate(
 ) -> Estimate:
     """Return a value with its interval on the logit of the place from `lowest` to 1."""
     # without (n_documents,): the values without each document
-    from scipy.special import stdtrit  # loaded only for an interval
-
     n, no_spans = len(without), "0/0: there are no spans to compare"
     # (n - 1)/n Σ (θ_i - mean)²
     error = float(np.sqrt((n - 1) * without.var())) if n > 1 else np.nan
     reason = undefined(facts["coefficient"], no_spans) if np.isnan(value) else None
     why = None if error > 1e-12 and lowest < value < 1.0 else reason or _NO_ENDS
-    room, ends = 1.0 - lowest, (np.nan, np.nan)
+    low = high = np.nan
     if why is None:
-        half = float(stdtrit(n - 1, 0.5 + 0.5 * level)) * error / room
-        ends = logit_ends((value - lowest) / room, half)
+        low, high = logit_ends(value, student_t(level, n - 1) * error, lowest)
     interval = Interval(
-        low=lowest + room * ends[0],
-        high=lowest + room * ends[1],
+        low=low,
+        high=high,
         level=level,
         kind="confidence",
         method=f"document jackknife, t({n - 1}) on the logit",

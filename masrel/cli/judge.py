@@ -1,7 +1,6 @@
 """``masrel judge``: whether a judge, such as a model, rates as well as the humans."""
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -10,15 +9,11 @@ from masrel.analysis._judging import Judging
 from masrel.cli._file_answers import by_option, clusters_option, file_command
 from masrel.cli._options import grouped
 
-if TYPE_CHECKING:
-    from masrel.analysis._file_estimates import Answer, Questions
-    from masrel.ratings import RatingsFile
 
+def _judged(*args: Any) -> Any:
+    from masrel.analysis._file_judges import judging_answers  # of this command alone
 
-def _judged(file: "RatingsFile", questions: "Questions") -> "Iterator[Answer]":
-    from masrel.analysis._file_judges import judging_answers
-
-    return judging_answers(file, questions)
+    return judging_answers(*args)
 
 
 judge = file_command(

@@ -8,17 +8,10 @@ import click
 from masrel._input import refuse
 from masrel.cli._options import (
     OutputOptions,
+    floats,
     output_options,
-    split_commas,
     write_output,
 )
-
-
-def _shares(text: str) -> list[float]:
-    try:
-        return [float(part) for part in split_commas(text)]
-    except ValueError as error:
-        raise click.BadParameter(f"needs shares as 0.9,0.85, got {text!r}") from error
 
 
 @click.command("plan --judge")
@@ -26,7 +19,7 @@ def _shares(text: str) -> list[float]:
 @click.option("--raters", "n_humans", type=int, help="Humans who grade every item.")
 @click.option(
     "--accuracy",
-    type=_shares,
+    type=floats,
     metavar="SHARES",
     help="How often a human is right, and the judge, as 0.9,0.85; one for both.",
 )

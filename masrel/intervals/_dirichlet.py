@@ -10,13 +10,9 @@ from itertools import permutations
 
 import numpy as np
 
-from masrel.agreement._engine import Floats
+from masrel.agreement._engine import Floats, recorded_generator
 from masrel.estimates import Distribution, Interval
-from masrel.intervals._question import (
-    WITHOUT_END,
-    IntervalProblem,
-    recorded_generator,
-)
+from masrel.intervals._question import WITHOUT_END, IntervalProblem
 from masrel.intervals._rho import (
     METHOD,
     Prior,

@@ -31,6 +31,8 @@ from masrel.agreement._engine import (
     Formula,
     Integers,
     check_level,
+    logit_ends,
+    student_t,
     undefined,
 )
 from masrel.agreement._labels import Codes, is_missing, is_row
@@ -164,15 +166,7 @@ class IntervalProblem:
         low, high = self.value - half, self.value + half
         lowest = None if lowest is None else max(lowest, -1.0)
         if lowest is not None and lowest < self.value < 1.0:
-            from scipy.special import expit, logit
-
-            # The error is divided by the slope of the logit, and the ends are taken
-            # back, so that they stay inside.
-            width = 1.0 - lowest
-            share = (self.value - lowest) / width
-            half /= width * share * (1.0 - share)
-            ends = np.array([logit(share) - half, logit(share) + half])
-            low, high = (lowest + width * expit(ends)).tolist()
+            low, high = logit_ends(self.value, half, lowest)
         return self.confidence(low, high, method=method, unit=unit, notes=notes)
 
     def confidence(
@@ -215,14 +209,6 @@ class IntervalProblem:
             unit=unit,
             reason=reason,
         )
-
-
-def student_t(level: float, df: float) -> float:
-    """Return the two-sided quantile of Student's t; that of the normal for inf."""
-    from scipy.special import ndtri, stdtrit  # loaded only when an interval needs it
-
-    upper = 0.5 + 0.5 * level
-    return float(ndtri(upper) if math.isinf(df) else stdtrit(df, upper))
 
 
 def pose_problem(
@@ -444,7 +430,7 @@ def cluster_sums(
     return sums, known, len(np.unique(clusters[paired]))
 
 
-# -- what is small, and what is random -------------------------------------------------
+# -- what is small ---------------------------------------------------------------------
 
 
 def warn_small(
@@ -467,18 +453,3 @@ def warn_small(
 def singular(what: str) -> str:
     """Return for one what is said in the plural."""
     return re.sub(r"s\b", "", what, count=1)  # "items with ratings": the first alone
-
-
-def recorded_generator(
-    rng: np.random.Generator | int | None,
-) -> tuple[np.random.Generator, int | None]:
-    """Return a generator and the seed that repeats it."""
-    if isinstance(rng, np.random.Generator):
-        return rng, None  # its owner knows where it began
-    if rng is None:
-        rng = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
-    if isinstance(rng, bool) or not isinstance(rng, int | np.integer) or rng < 0:
-        raise ParameterError(
-            f"rng: needs a numpy Generator or an integer of at least 0, got {rng!r}"
-        )
-    return np.random.default_rng(int(rng)), int(rng)

@@ -116,10 +116,6 @@ class RhoPosterior:
     """The posterior of ρ = 1 / (1 + A), integrated over π."""
 
     prior: Prior
-    # (n_parts,): parameters of the Dirichlet prior of π. Categories nobody used enter
-    # the likelihood nowhere, so they are one part, the last, whose parameter is the sum
-    # of theirs (the Dirichlet's aggregation property).
-    of_shares: Floats = field(compare=False, repr=False)
     powers: Floats = field(compare=False, repr=False)  # (n_used, n_depths): N_kj
     sizes: Floats = field(compare=False, repr=False)  # (n_depths,): n_j
     logit: LineDistribution = field(compare=False, repr=False)  # of logit ρ
@@ -128,6 +124,8 @@ class RhoPosterior:
     def of(cls, counts: NDArray[np.int64], prior: Prior) -> "RhoPosterior":
         """Integrate the posterior of counts (n_items, n_categories)."""
         used, n = counts.any(axis=0), counts.sum(axis=1)
+        # categories nobody used enter the likelihood nowhere, so they are one part, the
+        # last, whose parameter is the sum of theirs (the Dirichlet's aggregation)
         n_each = [1.0] * int(used.sum()) + [float((~used).sum())] * (not used.all())
         of_shares = prior.concentration * np.array(n_each)
         met = [
@@ -173,7 +171,6 @@ class RhoPosterior:
         masses = np.exp(log - log.max())
         return cls(
             prior=prior,
-            of_shares=of_shares,
             powers=powers,
             sizes=sizes,
             logit=LineDistribution(points=points, masses=masses / masses.sum()),

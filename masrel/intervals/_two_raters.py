@@ -17,16 +17,12 @@ import numpy as np
 from scipy.special import betainc
 
 from masrel.agreement._codes import pair_table
-from masrel.agreement._engine import Floats
+from masrel.agreement._engine import Floats, recorded_generator
 from masrel.agreement._weights import MANY
 from masrel.errors import ConvergenceError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._quadrature import beta_nodes, solve_quantile
-from masrel.intervals._question import (
-    WITHOUT_END,
-    IntervalProblem,
-    recorded_generator,
-)
+from masrel.intervals._question import WITHOUT_END, IntervalProblem
 from masrel.intervals._rho import prior_note, where_the_prior_weighs
 
 _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits

@@ -13,7 +13,7 @@ import numpy as np
 from masrel._input import check_option, refuse
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._codes import read_only
-from masrel.agreement._engine import Floats, Integers
+from masrel.agreement._engine import Floats, Integers, recorded_generator
 from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval, Target, Unit, _Caution
@@ -24,7 +24,6 @@ from masrel.intervals._question import (
     cluster_codes,
     cluster_sums,
     pose_problem,
-    recorded_generator,
     warn_small,
 )
 

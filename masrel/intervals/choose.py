@@ -37,7 +37,7 @@ import numpy as np
 
 from masrel._input import check_option, refuse
 from masrel.agreement import CountedRatings, Label, Metric, WeightsLike
-from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, Integers
+from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, Integers, student_t
 from masrel.estimates import (
     _POPULATIONS,
     Estimate,
@@ -55,7 +55,6 @@ from masrel.intervals._question import (
     find_entry,
     pose_problem,
     singular,
-    student_t,
     warn_small,
 )
 from masrel.intervals.analytic import _clustered_error, analytic
@@ -192,7 +191,7 @@ def estimate(
     refuse(
         (
             is_own and there_is not in (target, "both"),
-            f"target: the interval of {entry.title} generalises to "
+            f"target: the interval of {entry.title} generalises to other "
             f'{_POPULATIONS[there_is]}, which is "{there_is}", and it has no other; '
             f'got "{target}"',
         ),
@@ -256,8 +255,8 @@ def _with_own_target(result: Estimate, target: Target, rule: str) -> Estimate:
     if interval is None or interval.target == target:
         return result
     note = _Caution(
-        f"asked for {_POPULATIONS[target]}: there is this interval, for "
-        f"{_POPULATIONS[interval.target]}, and so rather too wide"
+        f"asked for other {_POPULATIONS[target]}: there is this interval, for "
+        f"other {_POPULATIONS[interval.target]}, and so rather too wide"
     )
     return replace(result, interval=replace(interval, notes=(*interval.notes, note)))
 

@@ -19,7 +19,7 @@ import numpy as np
 from masrel._input import check_option, refuse
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
 from masrel.agreement._codes import item_counts, read_only
-from masrel.agreement._engine import Floats, divide, tested, undefined
+from masrel.agreement._engine import Floats, divide, student_t, tested, undefined
 from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
@@ -29,7 +29,6 @@ from masrel.intervals._question import (
     cluster_codes,
     cluster_sums,
     pose_problem,
-    student_t,
     warn_small,
 )
 from masrel.intervals.jackknife import _variance_of

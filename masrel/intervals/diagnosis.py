@@ -13,7 +13,7 @@ import numpy as np
 from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._codes import distinct_rows, item_counts, read_only
-from masrel.agreement._engine import Array, Floats, Integers, divide
+from masrel.agreement._engine import Array, Floats, Integers, divide, student_t
 from masrel.agreement._weights import MANY
 from masrel.errors import MasrelWarning
 from masrel.estimates import Estimate
@@ -23,7 +23,6 @@ from masrel.intervals._question import (
     find_entry,
     of_rows,
     pose_problem,
-    student_t,
     warn_small,
 )
 from masrel.intervals.jackknife import _variance_of, _without_raters

@@ -32,13 +32,14 @@ from masrel.agreement._engine import (
     check_level,
     divide,
     logit_ends,
+    student_t,
     undefined,
 )
 from masrel.agreement._labels import check_categories, label_codes
 from masrel.agreement.benchmarks import _yekutieli_bounds
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval, Target, Unit
-from masrel.intervals._question import student_t, warn_small
+from masrel.intervals._question import warn_small
 from masrel.intervals.jackknife import _variance_of
 from masrel.judges._paired import (
     NO_CHANGE,

@@ -21,11 +21,13 @@ from masrel.agreement._engine import (
     Integers,
     check_level,
     divide,
+    recorded_generator,
+    student_t,
     undefined,
 )
 from masrel.agreement._labels import coded, columns_of, is_missing, label_codes
 from masrel.errors import RatingsError, SmallSampleWarning
-from masrel.intervals._question import recorded_generator, student_t, warn_small
+from masrel.intervals._question import warn_small
 from masrel.intervals.jackknife import _variance_of
 from masrel.judges._paired import check_count
 

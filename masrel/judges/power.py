@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from masrel._input import refuse
-from masrel.agreement._engine import Floats, Integers, check_level
+from masrel.agreement._engine import Floats, Integers, check_level, recorded_generator
 from masrel.agreement.benchmarks import _yekutieli_bounds
-from masrel.intervals._question import recorded_generator
 from masrel.judges._paired import check_count, check_share, rejected
 from masrel.judges.annotators import _EXACT_UP_TO, _Graded
 

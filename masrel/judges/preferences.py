@@ -19,12 +19,13 @@ from masrel.agreement._engine import (
     Integers,
     check_level,
     divide,
+    student_t,
     undefined,
 )
 from masrel.agreement._labels import coded, columns_of
 from masrel.errors import RatingsError
 from masrel.estimates import Significance
-from masrel.intervals._question import student_t, warn_small
+from masrel.intervals._question import warn_small
 from masrel.judges._paired import score_test
 
 _FIELDS = ("item", "first", "second", "winner")

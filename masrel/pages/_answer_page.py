@@ -335,13 +335,15 @@ def study_page(
         content=curves,
         stamp="",
     )
-    notes = first.notes[1:]  # the result stands above
-    table = replace(first, caption="Components of variance", read=(), notes=notes)
-    texts = (methods, *reference_texts(["brennan2001"]))
-    paper = [Paragraph(text=text) for text in texts]
+    table = replace(
+        first,
+        caption="Components of variance",
+        read=(),
+        notes=first.notes[1:],  # the result stands above
+    )
     sections = [
         Section(name="result", title="Result", blocks=(table, drawing, *more)),
-        Section(name="methods", title="Methods, to paste", blocks=(*paper,)),
+        _methods_section(methods, ["brennan2001"]),
     ]
     return html_page(
         Document(

@@ -421,5 +421,5 @@ def latent_methods(
         f"the largest R-hat was {number(result.r_hat, 4)} and the smallest effective "
         f"sample size {number(result.ess, 0)}. Prior: {result.prior.words}. "
     )
-    used = ("uebersax1993", "foreman2013")
-    return text + _SOFTWARE.format(*map(version, ("masrel", "numpy", "scipy"))), used
+    software = _SOFTWARE.format(*map(version, ("masrel", "numpy", "scipy")))
+    return text + software, ("uebersax1993", "foreman2013")

@@ -27,17 +27,10 @@ from statistics import NormalDist
 import numpy as np
 
 from masrel._input import refuse
-from masrel.agreement._engine import check_level
+from masrel.agreement._engine import Floats, check_level, student_t
 from masrel.planning._studies import all_studies, icc_ratio
 from masrel.planning._study_plan import FORMULAS, chance_of
-from masrel.planning._truth import (
-    ONE_WAY,
-    Design,
-    Floats,
-    at_value,
-    probabilities,
-    rows_of,
-)
+from masrel.planning._truth import ONE_WAY, Design, at_value, probabilities, rows_of
 
 _NORMAL = NormalDist()
 
@@ -290,8 +283,6 @@ def units_needed(
     >>> units_needed(3.0 * math.sqrt(1 / 20 + 1.96**2 / 38), 20, half_width=1.0)
     107
     """
-    from scipy.special import ndtri, stdtrit  # loaded only here
-
     check_level(level)
     refuse(
         (
@@ -301,8 +292,8 @@ def units_needed(
         ),
         (n_units < 2, f"n_units: needs two or more, got {n_units!r}"),
     )
-    of_one, upper = standard_error**2 * n_units / half_width**2, 0.5 + 0.5 * level
-    n = max(2, math.ceil(of_one * float(ndtri(upper)) ** 2))  # by the normal: too few
-    while of_one * float(stdtrit(n - 1, upper)) ** 2 > n:
+    of_one = standard_error**2 * n_units / half_width**2
+    n = max(2, math.ceil(of_one * student_t(level, math.inf) ** 2))  # too few
+    while of_one * student_t(level, n - 1) ** 2 > n:
         n += 1
     return n

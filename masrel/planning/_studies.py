@@ -16,19 +16,12 @@ from scipy.special import fdtr, fdtri, gammaln, ndtri, stdtrit
 
 from masrel._input import refuse
 from masrel.agreement import CodedRatings
+from masrel.agreement._engine import Floats, Integers
 from masrel.agreement._profile import profile_ends
 from masrel.errors import MasrelWarning
 from masrel.intervals import estimate
 from masrel.planning._study_plan import Progress, limits_of
-from masrel.planning._truth import (
-    AGREEMENT,
-    MAX_TABLES,
-    MODELS,
-    ONE_WAY,
-    Design,
-    Floats,
-    Integers,
-)
+from masrel.planning._truth import AGREEMENT, MAX_TABLES, MODELS, ONE_WAY, Design
 
 # numbers, their Monte Carlo errors, and how many studies were drawn
 Shown = tuple[dict[str, float], dict[str, float], int]

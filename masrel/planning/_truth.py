@@ -14,17 +14,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr, ndtri
 
 from masrel._input import refuse, shown
 from masrel.agreement import CodedRatings, Coefficient, Label, coefficient
+from masrel.agreement._engine import Floats, Integers
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.intervals._question import IntervalProblem, pose_problem
 from masrel.planning._study_plan import RATER_SHARE, LatentModel, Study
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 _SUM = 1e-6  # by which prevalences may miss 1
 _NODES = 401  # of the trapezoid sum over the trait of an item, from -8 to 8

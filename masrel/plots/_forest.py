@@ -19,10 +19,10 @@ from matplotlib.axes import Axes
 from matplotlib.legend_handler import HandlerLine2D
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS
+from masrel.agreement._engine import Floats
 from masrel.estimates import Estimate, Interval
 from masrel.plots._drawn_values import ForestRow
 from masrel.plots._style import (
@@ -65,12 +65,11 @@ _ZERO: dict[str, Any] = {
 
 _MARK: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.2, "zorder": 0.9}
 
-_Floats = NDArray[np.float64]
 
 # What a ridge is made of: places (of bars their edges) and heights of each part, all
 # heights in one unit.
 _Part = Literal["density", "stems", "bars"]
-_Ridge = dict[_Part, tuple[_Floats, _Floats]]
+_Ridge = dict[_Part, tuple[Floats, Floats]]
 _PARTS: dict[_Part, tuple[str, str]] = {  # colour, and name in the legend
     "density": (ORANGE, "posterior density, each to its own height"),
     "stems": (BLUE, "resamples of one value, each row to its own height"),
@@ -351,7 +350,7 @@ def _ridge(interval: Interval | None) -> _Ridge:
     return ridge
 
 
-def _bars(values: _Floats, shares: _Floats) -> tuple[_Floats, _Floats]:
+def _bars(values: Floats, shares: Floats) -> tuple[Floats, Floats]:
     # (n_bars + 1,), (n_bars,); a value on an edge belongs to the bar below, as 1 does
     cumulative = shares.cumsum() / shares.sum()
     low, high = values[np.searchsorted(cumulative, _MIDDLE).clip(0, values.size - 1)]

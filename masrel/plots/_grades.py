@@ -24,6 +24,7 @@ from masrel.agreement._weights import category_values
 from masrel.intervals.diagnosis import Diagnosis, _names, _place
 from masrel.plots._rater_pairs import (
     LINE,
+    Floats,
     cells,
     inches_of,
     letters_on,
@@ -48,7 +49,6 @@ from masrel.plots._style import (
 )
 from masrel.tables._tables import counted, number, percent
 
-_Floats = NDArray[np.float64]
 _Integers = NDArray[np.signedinteger[Any]]
 
 # seven of Okabe and Ito's, neighbours far apart, and grey for one more, or all others;
@@ -371,9 +371,9 @@ def categories(
 
 
 def categories_picture(
-    values: _Floats,
-    low: _Floats,
-    high: _Floats,
+    values: Floats,
+    low: Floats,
+    high: Floats,
     counts: _Integers,
     grades: Sequence[str],
     level: float,
@@ -478,7 +478,7 @@ def items_picture(
     raters: Sequence[str],
     grades: Sequence[str],
     is_ordered: bool,
-    values: _Floats,
+    values: Floats,
     intended: Sequence[int] | None = None,
 ) -> Picture:
     """Return ratings as a grid of coloured cells, with the grades in them."""
@@ -527,8 +527,8 @@ def items_picture(
 
 
 def _on_line(
-    values: _Floats, grades: Sequence[str]
-) -> tuple[_Floats, Callable[[Axes], None]]:
+    values: Floats, grades: Sequence[str]
+) -> tuple[Floats, Callable[[Axes], None]]:
     """Return colours of grades by value, (q, 4), and what draws the bar of them."""
     ends = [int(values.argmin()), int(values.argmax())]
     line = ScalarMappable(Normalize(*values[ends]), SEQUENTIAL)
@@ -542,7 +542,7 @@ def _on_line(
 
 def _grouped(
     freq: _Integers, grades: Sequence[str], is_ordered: bool
-) -> tuple[NDArray[np.intp], list[str], list[str], _Floats]:
+) -> tuple[NDArray[np.intp], list[str], list[str], Floats]:
     """Put grades together whose colours could not be told apart, being too many."""
     # freq (q,): how often each is met -> group of each, (q,); by group, what is written
     # in cells, what a legend says, and colours, (m, 4); numbers stand for long names
@@ -569,7 +569,7 @@ def _grouped(
 
 
 def _legend(
-    texts: Sequence[str], colours: _Floats, across: float
+    texts: Sequence[str], colours: Floats, across: float
 ) -> tuple[float, Callable[[Axes], None]]:
     """Return the inches of what explains colours, and what draws it."""
     most = max(1, int(across / (0.45 + max(map(inches_of, texts)))))

@@ -206,7 +206,7 @@ def rows_of_shares(
         axes.text(0.08, row, text, transform=place, va="center", fontsize=8)
 
 
-_Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 # from little to full agreement: lighter to darker in a grey print, too
 _COLOURS = LinearSegmentedColormap.from_list(
@@ -294,7 +294,7 @@ def pairs_pictures(
     return [(name, pairs_picture(result, title)) for name, result in parts]
 
 
-def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> _Floats:
+def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> Floats:
     # by rater, and then with the reference if there is one
     values = result.pair_values[np.ix_(order, order)]
     if result.reference is None:
@@ -302,7 +302,7 @@ def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> _Floats:
     return np.column_stack([values, result.reference_values[order]])
 
 
-def _heatmap(axes: Axes, values: _Floats, names: Sequence[str]) -> None:
+def _heatmap(axes: Axes, values: Floats, names: Sequence[str]) -> None:
     n_rows, n_columns = values.shape
     letters = [[_short(value) for value in row] for row in values.tolist()]
     shown = np.array(letters if n_rows <= _MAX_NUMBERS else [[]])

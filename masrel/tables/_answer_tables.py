@@ -10,6 +10,7 @@ from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
 from masrel.analysis._file_estimates import AgreementRow, Answer, Explanation, Row
 from masrel.estimates import (
+    _POPULATIONS,
     Estimate,
     Interval,
     Target,
@@ -26,15 +27,7 @@ from masrel.tables._estimate_words import (
     promise,
     sentence,
 )
-from masrel.tables._tables import (
-    POPULATIONS,
-    SIMULATED,
-    Column,
-    Table,
-    capital,
-    percent,
-    table_of,
-)
+from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, table_of
 
 if TYPE_CHECKING:
     from masrel.plots._drawn_values import Drawn
@@ -475,7 +468,7 @@ def _cells(
             texts.append(_Caution(why))
         cells |= {key: getattr(interval, key) for key in _OF_INTERVAL}
         cells["interval_texts"] = [*texts, *interval.notes]
-        cells["population"] = POPULATIONS[interval.target]
+        cells["population"] = _POPULATIONS[interval.target]
     return cells
 
 
@@ -621,10 +614,10 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
         if interval := row.estimate.interval:
             details = ["one-sided"] * interval.is_one_sided
             if interval.target != common:
-                details.append(f"other {POPULATIONS[interval.target]}")
+                details.append(f"other {_POPULATIONS[interval.target]}")
         group = row.group if several else ""
         detail = ", ".join(details)
         drawn.append(forest_row(row.title, row.estimate, detail=detail, group=group))
     if any(interval.reason is None for interval in intervals):
-        label += f"; intervals for other {POPULATIONS[common]}"
+        label += f"; intervals for other {_POPULATIONS[common]}"
     return Drawn(FOREST, (tuple(drawn), label))

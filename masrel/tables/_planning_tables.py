@@ -6,17 +6,10 @@ from dataclasses import asdict
 from typing import Any
 
 from masrel.agreement import coefficient
+from masrel.estimates import _POPULATIONS
 from masrel.planning import Plan
 from masrel.plots._drawn_values import Drawn
-from masrel.tables._tables import (
-    POPULATIONS,
-    Column,
-    Table,
-    number,
-    percent,
-    significant,
-    table_of,
-)
+from masrel.tables._tables import Column, Table, number, percent, significant, table_of
 
 _EQUAL = 1e-9  # prevalences that differ by less
 
@@ -48,7 +41,7 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
     first = plans[0]
     caption = (
         f"What studies can show of {coefficient(first.coefficient).title}, "
-        f"{percent(first.level)} % interval for other {POPULATIONS[first.target]}, "
+        f"{percent(first.level)} % interval for other {_POPULATIONS[first.target]}, "
         f"model: {first.model}"
         if not labels
         else "What the study can show, by line of its plan"
@@ -73,7 +66,7 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
 def _row(plan: Plan) -> dict[str, Any]:
     values = _values(plan)
     return values | {
-        "target": POPULATIONS[plan.target],
+        "target": _POPULATIONS[plan.target],
         "prevalences": ", ".join(significant(share, 3) for share in plan.prevalences),
         "reaches": {True: "yes", False: "no", None: None}[plan.reaches_aim],
         "half_width": values["expected_half_width"],
@@ -143,7 +136,7 @@ def planning_sentence(plan: Plan) -> str:
     return (
         f"With {plan.n_items} items and {plan.n_raters} raters, the {sides}"
         f"{percent(plan.level)} % interval of {title}{weights} for other "
-        f"{POPULATIONS[plan.target]}{width}{rest}, if the "
+        f"{_POPULATIONS[plan.target]}{width}{rest}, if the "
         f"coefficient is {significant(plan.value, 3)} ({_model(plan)}{how})."
     )
 

@@ -27,9 +27,6 @@ ABSENT = "–"
 UNDEFINED = "undefined"
 """What is shown for ``nan``."""
 
-POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
-"""What an interval is for others of, by its target."""
-
 # What tables and figures of simulated data carry
 SIMULATED = "SIMULATED DATA"
 SIMULATED_DEVICE = "SIMULATED DEVICE"

@@ -8,11 +8,10 @@ import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import Label, code_ratings
-from masrel.agreement._engine import Floats, check_level
+from masrel.agreement._engine import Floats, check_level, recorded_generator
 from masrel.agreement._labels import Codes
 from masrel.errors import RatingsError
 from masrel.estimates import Distribution, Estimate, Interval, Target
-from masrel.intervals._question import recorded_generator
 from masrel.intervals.latent._implied import (
     Agreement,
     Items,

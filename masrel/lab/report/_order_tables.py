@@ -14,7 +14,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from masrel.intervals._question import student_t
+from masrel.agreement._engine import student_t
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Rating, Ratings
 from masrel.lab.report._material import Material, lacking, sentence
