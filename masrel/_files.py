@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from masrel.errors import ParameterError
+from masrel._input import refuse
 
 # What Windows alone has, and what it lacks
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
@@ -217,10 +217,12 @@ def sync_folder(folder: Path) -> None:
 
 def check_inside(folder: Path, root: Path) -> None:
     """Refuse a folder of a study that a link leads out of it."""
-    if not folder.resolve().is_relative_to(root.resolve()):
-        raise ParameterError(
-            f"{folder}: needs to be in {root}, got a link to {folder.resolve()}"
+    refuse(
+        (
+            not folder.resolve().is_relative_to(root.resolve()),
+            f"{folder}: needs to be in {root}, got a link to {folder.resolve()}",
         )
+    )
 
 
 def refuse_record(path: Path) -> None:
@@ -228,12 +230,14 @@ def refuse_record(path: Path) -> None:
     place = path.parent.resolve() / path.name
     for root in place.parents:
         parts = place.relative_to(root).parts
-        is_record = parts[0] in _RECORD_FOLDERS or parts in _SOURCES
-        if (is_record or parts == (_PROTOCOL,)) and (root / _PROTOCOL).is_file():
-            raise ParameterError(
+        is_record = parts[0] in _RECORD_FOLDERS or parts in (*_SOURCES, (_PROTOCOL,))
+        refuse(
+            (
+                is_record and (root / _PROTOCOL).is_file(),
                 f"{path}: needs a file that is no primary record, got one of the "
-                f"study {root}"
+                f"study {root}",
             )
+        )
 
 
 def safe_cell(text: str) -> str:

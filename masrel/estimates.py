@@ -349,5 +349,4 @@ def _plain(value: object) -> object:
         return str(value)  # also of a note that has a brief form
     if isinstance(value, tuple | list):
         return [_plain(part) for part in value]
-    is_none = isinstance(value, float) and not math.isfinite(value)
-    return None if is_none else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value

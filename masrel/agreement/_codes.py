@@ -122,8 +122,13 @@ def code_ratings(
         return ratings
     scale = None if categories is None else check_categories(categories)
     shape = getattr(ratings, "shape", None)  # of an array or a frame
-    if shape is not None and (len(shape) != 2 or 0 in shape):
-        raise RatingsError(f"{_NOTHING}, got shape {shape}")
+    refuse(
+        (
+            shape is not None and (len(shape) != 2 or 0 in shape),
+            f"{_NOTHING}, got shape {shape}",
+        ),
+        error=RatingsError,
+    )
     if type(ratings) is not np.ndarray and type(ratings) is not list:
         ratings, scale = _plain_table(ratings, scale)
     if isinstance(ratings, np.ndarray) and ratings.dtype.kind in "iuf":
@@ -207,8 +212,7 @@ def _rows_of(
                 f"{shown(row)}"
             )
         rows.append(labels)
-    if not rows:
-        raise RatingsError(f"{_NOTHING}, got none")
+    refuse((not rows, f"{_NOTHING}, got none"), error=RatingsError)
     return rows
 
 
@@ -307,11 +311,14 @@ def side_by_side(first: Any, second: Any) -> Any:
         return first
     columns = [_labels_of(first), _labels_of(second)]
     lengths = [len(labels) for labels in columns if labels is not None]
-    if len(lengths) < 2:
-        raise RatingsError(
+    refuse(
+        (
+            len(lengths) < 2,
             "ratings, other: needs the labels of two raters, a sequence each, or one "
-            f"table alone, got {type(first).__name__} and {type(second).__name__}"
-        )
+            f"table alone, got {type(first).__name__} and {type(second).__name__}",
+        ),
+        error=RatingsError,
+    )
     refuse(
         (
             lengths[0] != lengths[1],
@@ -421,16 +428,25 @@ def code_long(
 
 def check_frame(frame: Any, columns: Iterable[str], name: str = "frame") -> None:
     """Check that something is a DataFrame of a row or more that has these columns."""
-    if not hasattr(frame, "columns") or not hasattr(frame, "iloc"):
-        raise RatingsError(f"{name}: needs a DataFrame, got {type(frame).__name__}")
-    for column in columns:
-        if column not in frame.columns:
-            raise RatingsError(
+    refuse(
+        (
+            not (hasattr(frame, "columns") and hasattr(frame, "iloc")),
+            f"{name}: needs a DataFrame, got {type(frame).__name__}",
+        ),
+        error=RatingsError,
+    )
+    refuse(
+        *(
+            (
+                column not in frame.columns,
                 f"ratings: needs a column {column!r}, got "
-                f"{', '.join(map(repr, frame.columns))}"
+                f"{', '.join(map(repr, frame.columns))}",
             )
-    if not len(frame):
-        raise RatingsError(f"{_NOTHING}, got no row")
+            for column in columns
+        ),
+        (not len(frame), f"{_NOTHING}, got no row"),
+        error=RatingsError,
+    )
 
 
 def numbers(column: Any, name: str) -> NDArray[np.float64]:
@@ -441,11 +457,14 @@ def numbers(column: Any, name: str) -> NDArray[np.float64]:
         raise RatingsError(
             f"ratings: column {name!r} needs numbers: {error}"
         ) from error
-    if np.isinf(values).any():
-        raise RatingsError(
+    refuse(
+        (
+            np.isinf(values).any(),
             f"ratings: row {np.isinf(values).argmax()}, column {name!r}: needs a "
-            "finite number, got infinity"
-        )
+            "finite number, got infinity",
+        ),
+        error=RatingsError,
+    )
     return np.asarray(values)
 
 
@@ -705,8 +724,13 @@ def two_raters(
 ) -> CountedRatings:
     """Count the items that both of two raters rated."""
     counted = raters_told_apart(ratings, categories)
-    if (n_columns := counted.codes.shape[1]) != 2:
-        raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")
+    refuse(
+        (
+            counted.codes.shape[1] != 2,
+            f"{title} needs the ratings of two raters, got {counted.codes.shape[1]}",
+        ),
+        error=RatingsError,
+    )
     return complete_rows(counted)
 
 

@@ -184,10 +184,13 @@ def columns_of(rows: Any, fields: Sequence[str]) -> list[list[Any]]:
             next((n for n in USUAL_NAMES.get(field, ()) if n in columns), field)
             for field in fields
         ]
-        if not columns.keys() >= set(names):
-            raise RatingsError(
-                f"ratings: needs columns {', '.join(fields)}, got {listed(columns)}"
-            )
+        refuse(
+            (
+                not columns.keys() >= {*names},
+                f"ratings: needs columns {', '.join(fields)}, got {listed(columns)}",
+            ),
+            error=RatingsError,
+        )
         return [columns[name] for name in names]
     table = list(rows) if is_row(rows) else [rows]
     for place, row in enumerate(table):

@@ -149,8 +149,9 @@ class Components:
         if likelihood is None:
             if not absolute or self.raters == 0.0:
                 return 1.0, 1.0
-            squares = k * self.items, n * self.raters, 0.0
-            low, high = profile_ends(n, k, squares, level)
+            low, high = profile_ends(
+                n, k, (k * self.items, n * self.raters, 0.0), level
+            )
             return float(low), float(high)
 
         def deviance(a: Floats, x: Floats) -> Floats:

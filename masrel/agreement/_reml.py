@@ -130,8 +130,7 @@ class _Equations:
             probes = np.eye(len(rows))
             if len(rows) > _EXACT:
                 rng = np.random.default_rng(0)
-                signs = rng.choice([-1.0, 1.0], (len(rows), _SIGNS))
-                probes = signs / np.sqrt(_SIGNS)
+                probes = rng.choice([-1.0, 1.0], (len(rows), _SIGNS)) / np.sqrt(_SIGNS)
             right = self.products[:-1, rows] @ probes
             left = self._projected(right, theta, factor, lower)
             traces[effect] = (probes * left[rows]).sum()

@@ -319,10 +319,9 @@ def _checked_matrix(weights: Any, categories: Sequence[Label]) -> Floats:
             f"pair of categories, got shape {table.shape} of {table.dtype}",
         )
     )
-    is_same = np.eye(len(categories), dtype=bool)
     for needed, is_wrong in (
         ("finite numbers of at most 1", ~np.isfinite(table) | (table > 1)),
-        ("1 on the diagonal", is_same & (table != 1)),
+        ("1 on the diagonal", np.eye(len(categories), dtype=bool) & (table != 1)),
         ("a symmetric matrix", table != table.T),
     ):
         for k, m in np.argwhere(is_wrong):

@@ -352,8 +352,7 @@ def _fit(
         if (fit := components(values, cells, largest, start)) is not None:
             squares = expected @ fit[0]
             # as many degrees of freedom as give these squares their variance
-            variances = np.einsum("ij,jk,ik->i", expected, fit[1], expected)
-            df = 2.0 * squares**2 / variances
+            df = 2.0 * squares**2 / np.einsum("ij,jk,ik->i", expected, fit[1], expected)
             if (df > 0.0).all():
                 few = [_FEW_RATINGS] if df[-1] < _FEW else []
                 return fit[0], pivotal_draws(squares, df, expected, rng), "REML", few
@@ -397,11 +396,14 @@ def _read(
     codes = {}
     for name in columns:
         codes[name], names = levels(rated[name], name)
-        if len(names) < 2:
-            raise RatingsError(
+        refuse(
+            (
+                len(names) < 2,
                 f"ratings: column {name!r} needs two levels or more, got "
-                f"{names[0]} alone: what never varies has no variance"
-            )
+                f"{names[0]} alone: what never varies has no variance",
+            ),
+            error=RatingsError,
+        )
     return numbers(rated[grade], grade), codes
 
 
@@ -419,11 +421,14 @@ def _cells(
     if cell.max() + 1 < n_ratings:
         effects[_RESIDUAL] = columns | {_RESIDUAL}
         cells[effects[_RESIDUAL]] = np.arange(n_ratings)
-    if together := told_together(cells):
-        names = " and ".join(np.array([*effects])[together])
-        raise RatingsError(
-            f"ratings: {names} need to be told apart, but the same ratings share a "
-            "level of each; what has levels of its own in each level of another is "
-            "nested"
-        )
+    together = [[*effects][place] for place in told_together(cells)]
+    refuse(
+        (
+            together,
+            f"ratings: {' and '.join(together)} need to be told apart, but the same "
+            "ratings share a level of each; what has levels of its own in each level "
+            "of another is nested",
+        ),
+        error=RatingsError,
+    )
     return cells

@@ -618,17 +618,19 @@ def limits_by_clusters(
     refuse((len(names) < 2, needed), error=RatingsError)
     # of all rows, and without each cluster
     results: list[Any] = [measure(data[codes != k]) for k in range(-1, len(names))]
-    of_pairs = isinstance(results[0], RepeatedLimits)
-    if of_pairs:
-        pairs: _Limits = _of_pairs(results, level)
-        return pairs
+    is_of_pairs = isinstance(results[0], RepeatedLimits)
+    result: _Limits = (_of_pairs if is_of_pairs else _of_observers)(results, level)
+    return result
+
+
+def _of_observers(results: list[Any], level: float) -> Any:
+    """Return limits with the mean, by those of all rows and without each cluster."""
     logs = [[_log(getattr(of, name).value) for name in _OF_MEAN] for of in results]
     ends = zip(_OF_MEAN, map(_exponential, _left_out(logs, level)), strict=True)
-    estimates: Any = {
-        name: replace(getattr(results[0], name), interval=of) for name, of in ends
-    }
-    result: _Limits = replace(results[0], **estimates)
-    return result
+    return replace(
+        results[0],
+        **{name: replace(getattr(results[0], name), interval=of) for name, of in ends},
+    )
 
 
 def _of_pairs(results: list[Any], level: float) -> Any:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from masrel._input import refuse, split_names
-from masrel.errors import MasrelError, ParameterError, RatingsError
+from masrel.errors import MasrelError, RatingsError
 from masrel.estimates import (
     Estimate,
     Interval,
@@ -178,15 +178,18 @@ class Questions(Estimating):
         from masrel.agreement._weights import plain_name
 
         check_level(self.level)  # nothing else looks at it where there is no interval
-        for name in self.names:
-            if other := _TABLES.get(name.lower().replace("-", "_")):
-                raise ParameterError(
-                    f"--coefficients: needed coefficients, got {name!r}: {other} has "
-                    "that table"
-                )
+        others = {name: name.lower().replace("-", "_") for name in self.names}
         tables = [of.replace("_", "-") for of in _BY_ITEM if getattr(self, of)]
         of_raters = self.target in ("raters", "both")
         refuse(
+            *(
+                (
+                    other in _TABLES,
+                    f"--coefficients: needed coefficients, got {name!r}: "
+                    f"{_TABLES.get(other)} has that table",
+                )
+                for name, other in others.items()
+            ),
             (
                 clusters is not None and tables,
                 f"--clusters: --{''.join(tables[:1])} takes every item by itself, so "
@@ -558,8 +561,7 @@ def estimate_row(
 ) -> AgreementRow:
     """Return the row of a coefficient; of all that fit, some without an interval."""
     notes = []
-    is_unweighted = questions.weights != questions.weights_of(entry)
-    if is_unweighted and not questions.takes_all:
+    if questions.weights != questions.weights_of(entry) and not questions.takes_all:
         notes.append(
             f"by its metric, without {questions.weights} weights"
             if entry.metric

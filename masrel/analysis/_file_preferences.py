@@ -40,11 +40,9 @@ def preference_answers(file: RatingsFile, questions: Questions) -> Iterator[Answ
         _of_judge(file, judge, verdicts[judge], tie, questions.level)
         for judge in judges or list(verdicts)
     ]
-    biases = [bias for bias, _ in answers]
-    strengths = [row for _, rows in answers for row in rows]
     for name, kind, rows in (
-        ("preferences", "position", biases),
-        ("strengths", "strengths", strengths),
+        ("preferences", "position", [bias for bias, _ in answers]),
+        ("strengths", "strengths", [row for _, of in answers for row in of]),
     ):
         yield Answer(
             name=name,

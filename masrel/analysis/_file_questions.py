@@ -380,9 +380,8 @@ def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
 
 def _indices(file: RatingsFile, _: Questions) -> Iterator[Answer]:
     """Give what the margins of two raters and two categories do to kappa."""
-    rows_of = partial(_of_margins, file.scale.grades)
     yield replace(
-        _table("indices", file, rows_of, "--indices"),
+        _table("indices", file, partial(_of_margins, file.scale.grades), "--indices"),
         notes=tuple(map(note, ("pabak", "on_category", "largest"))),
     )
 
@@ -616,11 +615,10 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
 
     if questions.coefficients is None and questions.metric is None:
         questions = replace(questions, coefficients=["fleiss_kappa"])
-    names = ",".join(questions.names)
     refuse(
         (
             questions.takes_all or len(questions.names) > 1,
-            f"--coefficients: needs one coefficient, got {names}",
+            f"--coefficients: needs one coefficient, got {','.join(questions.names)}",
         )
     )
     (entry,) = entries(questions, file, file.parts)
@@ -750,10 +748,9 @@ def _diagnosis_notes(
     }
     right = [] if reference is None else [note("reference", rater=reference)]
     texts = dict.fromkeys(f"{text}." for result in results for text in result.notes)
-    of_raters = [*right, *(ends["raters"] or [note("no_ends")]), *texts]
     return {
         **ends,
-        "raters": of_raters,
+        "raters": [*right, *(ends["raters"] or [note("no_ends")]), *texts],
         "confusion": [note("confusion"), *ends["confusion"]],
     }
 

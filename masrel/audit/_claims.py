@@ -327,11 +327,10 @@ def _claims_of(text: str) -> tuple[Claim, ...]:
     ]
     known = [field.name for field in fields(Claim)]
     strays = [name for name in head if name not in known]
-    are_there = set(head).issuperset(_NEEDED) and len(set(head)) == len(head)
     refuse(
         (strays, f"needs columns among {', '.join(known)}, got {listed(strays)}"),
         (
-            not are_there,
+            not (set(head).issuperset(_NEEDED) and len(set(head)) == len(head)),
             f"needs the columns {', '.join(_NEEDED)}, and each column once, got "
             f"{listed(head)}",
         ),

@@ -439,8 +439,7 @@ def _one_by_one(claim: Claim) -> _Read:
     has_errors = not printed.keys().isdisjoint(UNCERTAINTY)
     values = _errors(tables, claim.kappa_weights) if has_errors else {}
     errors = _ERRORS if printed.keys() & {"standard_error", "low"} else (None,)
-    tests = _TESTS if "p" in printed else (None,)
-    for error, test in product(errors, tests):
+    for error, test in product(errors, _TESTS if "p" in printed else (None,)):
         fits = np.ones(len(tables), dtype=bool)
         if error is not None:
             fits &= _has_error(claim, values["kappa"], values[error])

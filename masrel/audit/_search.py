@@ -322,8 +322,7 @@ class SquareTables(_Search):
             tables[:, self.second, self.first] = between - above[begin:end]
             for margins, axis in ((self.claim.margins_1, 2), (self.claim.margins_2, 1)):
                 if margins is not None:
-                    fits = tables.sum(axis=axis) == margins
-                    tables = tables[fits.all(axis=1)]
+                    tables = tables[(tables.sum(axis=axis) == margins).all(axis=1)]
             yield from tables
 
 

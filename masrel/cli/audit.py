@@ -89,7 +89,6 @@ def audit(
 
     audits = [audit_claim(claim) for claim in claims]
     table = readings_table if output.csv else claims_table
-    is_table = not (output.csv or output.sentence)
     write_output(
         output,
         document=lambda: claims_document(audits),
@@ -98,7 +97,7 @@ def audit(
             if output.sentence
             else table(audits)
         ),
-        more=(readings_table(audits),) if is_table else (),
+        more=(readings_table(audits),) if not (output.csv or output.sentence) else (),
         width=_WIDTH,
     )
 
@@ -124,8 +123,7 @@ def _claim(texts: _Texts) -> "Claim":
     from masrel.audit._claims import claim_of
 
     values = {name: text for name, text in texts.items() if isinstance(text, str)}
-    ends = texts.get("interval", ())
-    values |= dict(zip(("low", "high"), ends, strict=False))
+    values |= dict(zip(("low", "high"), texts.get("interval", ()), strict=False))
     refuse(
         *(
             (name not in texts, f"{name}: needed without a SOURCE, got none")

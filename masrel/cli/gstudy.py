@@ -149,13 +149,12 @@ def gstudy(
 
     sheet, columns = read_facets(file, facets, reading)
     of, *_, grade = columns
-    within = dict(pair.partition(":")[::2] for pair in nested)
     with placed(str(file)):
         study = g_study(
             DataFrame(columns),
             of=of,
             facets=facets,
-            nested=within,
+            nested=dict(pair.partition(":")[::2] for pair in nested),
             fixed=fixed,
             grade=grade,
             **of_intervals,
@@ -171,16 +170,21 @@ def gstudy(
         ]
         if aim is not None:
             designs.append(cheapest_design(study, aim, prices=prices, of=seek))
-        data = "simulated" if sheet.is_simulated else "foreign"
-        seed = of_intervals["rng"]
         plans = [
-            design_precision(study, of.sizes, n_persons=n, aim=aim, of=seek, rng=seed)
+            design_precision(
+                study, of.sizes, n_persons=n, aim=aim, of=seek, rng=of_intervals["rng"]
+            )
             for of in designs
             for n in persons or ()
             if sizes or of.cost is not None  # of those that somebody asked for
         ]
-        name = sheet.name
-        shown, document = study_tables(study, designs, plans, file=name, data=data)
+        shown, document = study_tables(
+            study,
+            designs,
+            plans,
+            file=sheet.name,
+            data="simulated" if sheet.is_simulated else "foreign",
+        )
         curves = study_curves(study, aim)
     inputs = {"Command": call_text(), f"SHA-256 of {file.name}": sheet.sha256()}
     write_output(

@@ -266,8 +266,13 @@ def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
     from masrel.ratings import read_ratings
 
     parts = read_ratings(path).parts
-    needed = f"--pilot: needs the ratings of one group and session, {path} has"
-    refuse((len(parts) != 1, f"{needed} {len(parts)}"))
+    refuse(
+        (
+            len(parts) != 1,
+            f"--pilot: needs the ratings of one group and session, {path} has "
+            f"{len(parts)}",
+        )
+    )
     names = ("coefficient", "target", "weights", "level")
     of_pilot = {name: arguments[name] for name in names if name in arguments}
     made = pilot(ratings=parts[0].ratings, **of_pilot)

@@ -93,13 +93,17 @@ def spans(
     refuse(
         (chosen not in n_spans, f"{file}: needs a document with spans, got {chosen}")
     )
-    of_chosen = [row[1:] for row in rows if row[0] == chosen]
     drawn = Drawn(
         "masrel.plots._spans_figure:spans_picture",
-        (of_chosen, lengths.get(f"{chosen}"), chosen),
+        (
+            [row[1:] for row in rows if row[0] == chosen],
+            lengths.get(f"{chosen}"),
+            chosen,
+        ),
     )
-    data = b"".join(of.read_bytes() for of in sorted(file.rglob("*.ann")) or [file])
-    digest = sha256(data).hexdigest()
+    digest = sha256(
+        b"".join(of.read_bytes() for of in sorted(file.rglob("*.ann")) or [file])
+    ).hexdigest()
     write_output(
         output,
         document=lambda: {

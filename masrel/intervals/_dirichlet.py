@@ -145,7 +145,6 @@ def _interval(
         high = (1.0, 0.0)
     # a density from how far apart quantiles are, between which equally many draws lie
     ends = np.quantile(drawn, np.linspace(0.0, 1.0, _SHOWN + 1))
-    widths = np.maximum(np.diff(ends), np.finfo(float).tiny)
     return Interval(
         low=low[0],
         high=high[0],
@@ -162,7 +161,7 @@ def _interval(
         prior=prior,
         distribution=Distribution(
             values=0.5 * (ends[:-1] + ends[1:]),
-            weights=1.0 / (_SHOWN * widths),
+            weights=1.0 / (_SHOWN * np.maximum(np.diff(ends), np.finfo(float).tiny)),
             continuous=True,
             words=f"posterior of {problem.entry.title}, prior {prior}",
         ),

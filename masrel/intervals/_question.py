@@ -324,8 +324,6 @@ def _of_rows(
     features = formula.features(codes, v)
     sums, freq = features.summed(often)
     value = float(formula.value(sums, v))
-    # weights, or items of a single rating, can bring a coefficient below -1
-    min_value = entry.lowest if value >= entry.lowest else -math.inf
     return {
         "codes": codes,
         "often": often,
@@ -336,7 +334,8 @@ def _of_rows(
         "n_items": int(freq.sum()),
         # a pair is of one rater in a test-retest, where rows without do not matter
         "n_paired_items": int(freq @ ((codes >= 0).sum(axis=1) >= 2)),
-        "min_value": min_value,
+        # weights, or items of a single rating, can bring a coefficient below -1
+        "min_value": entry.lowest if value >= entry.lowest else -math.inf,
     }
 
 

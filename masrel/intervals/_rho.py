@@ -28,10 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, gammaln
 
-from masrel._input import check_option
+from masrel._input import check_option, refuse
 from masrel.agreement._engine import Floats
 from masrel.agreement._weights import Distances
-from masrel.errors import ConvergenceError, ParameterError
+from masrel.errors import ConvergenceError
 from masrel.estimates import Distribution, Interval, _LongNote
 from masrel.intervals._quadrature import (
     LineDistribution,
@@ -72,11 +72,13 @@ class Prior:
         """Return a prior, checked."""
         check_option("prior", name, get_args(PriorName))
         is_number = isinstance(concentration, int | float | np.number)
-        if not (is_number and 0.0 < concentration <= _SUREST):
-            raise ParameterError(
+        refuse(
+            (
+                not (is_number and 0.0 < concentration <= _SUREST),
                 f"concentration: needs more than 0 and at most {_SUREST:g}, got "
-                f"{concentration!r}"
+                f"{concentration!r}",
             )
+        )
         return cls(name=name, concentration=float(concentration))
 
     @property

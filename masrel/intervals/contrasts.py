@@ -788,11 +788,13 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
     equality_test: 7.971, chi-squared(2), p = 0.0186
     """
     checked: list[Any] = list(estimates) if is_row(estimates) else [estimates]
-    if len(checked) < 2 or not all(isinstance(e, Estimate) for e in checked):
-        raise ParameterError(
+    refuse(
+        (
+            len(checked) < 2 or not all(isinstance(e, Estimate) for e in checked),
             "estimates: needs two or more of type Estimate, got "
-            f"{', '.join(type(e).__name__ for e in checked) or 'none'}"
+            f"{', '.join(type(e).__name__ for e in checked) or 'none'}",
         )
+    )
     if len(kinds := {(e.coefficient, e.weights): None for e in checked}) > 1:
         of_kinds = (f"{name} ({weights})" for name, weights in kinds)
         raise ParameterError(

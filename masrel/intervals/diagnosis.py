@@ -433,11 +433,10 @@ def _confusions(
             continue
         squares = (of_others**2).T @ weighed  # Σ a², which is Σ ab
         n_items = ((of_others > 0.0).T.astype(np.float64) @ weighed).sum(axis=1)
-        wholes = confusion[place].sum(axis=1)
         low[place], high[place] = _share_interval(
             level,
             parts=confusion[place],
-            wholes=np.broadcast_to(wholes[:, None], wide),
+            wholes=np.broadcast_to(confusion[place].sum(axis=1)[:, None], wide),
             squares=squares,
             products=squares,
             whole_squares=np.broadcast_to(squares.sum(axis=1)[:, None], wide),

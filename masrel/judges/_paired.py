@@ -16,7 +16,6 @@ from scipy.special import bdtr, gammaln, ndtr, ndtri, stdtr, xlog1py, xlogy
 
 from masrel._input import refuse, shown
 from masrel.agreement._engine import Floats, Integers, check_level, undefined
-from masrel.errors import ParameterError
 
 PairedTest = Literal["exact", "score", "t"]
 """Ways to test whether p_b - p_c is less than a bound."""
@@ -161,17 +160,23 @@ def score_test(
 
 def check_count(name: str, count: object, fewest: int = 1) -> None:
     """Check that an argument is a whole number that is large enough."""
-    if not isinstance(count, int | np.integer) or count < fewest:
-        raise ParameterError(
-            f"{name}: needs a whole number of at least {fewest}, got {shown(count)}"
+    refuse(
+        (
+            not isinstance(count, int | np.integer) or count < fewest,
+            f"{name}: needs a whole number of at least {fewest}, got {shown(count)}",
         )
+    )
 
 
 def check_share(name: str, value: object, lowest: float = 0.0) -> None:
     """Check that an argument is a share, or the difference of two."""
     is_number = isinstance(value, int | float | np.integer | np.floating)
-    if not (is_number and lowest <= value <= 1.0):  # type: ignore[operator]
-        raise ParameterError(f"{name}: needs [{lowest:g}, 1], got {shown(value)}")
+    refuse(
+        (
+            not (is_number and lowest <= value <= 1.0),  # type: ignore[operator]
+            f"{name}: needs [{lowest:g}, 1], got {shown(value)}",
+        )
+    )
 
 
 def tango(b: ArrayLike, c: ArrayLike, n: float, delta: float) -> Floats:

@@ -342,7 +342,6 @@ def _human(
     else:
         way, p = "clusters", p_less_of_clusters(d, units[rated], epsilon)
     why = NO_CHANGE if units is None else _NO_CLUSTERS
-    reason = undefined(f"the p-value of {name}", why) if math.isnan(p) else None
     return {
         "name": name,
         "n_items": n,
@@ -352,7 +351,7 @@ def _human(
         "human_share": 1.0 - c / n,
         "test": way,
         "p_value": p,
-        "reason": reason,
+        "reason": undefined(f"the p-value of {name}", why) if math.isnan(p) else None,
     }
 
 
@@ -840,8 +839,9 @@ def _advantages(lost: _Bools, graded: _Graded) -> Floats:
     """Return the mean over humans of 1 - b/n, (n_judges,)."""
     n_items = graded.rated.sum(axis=0)
     counts = graded.is_tested & (n_items > 0)
-    shares = 1.0 - lost.sum(axis=1)[:, counts] / n_items[counts]
-    return np.asarray(shares.mean(axis=1))
+    return np.asarray(
+        (1.0 - lost.sum(axis=1)[:, counts] / n_items[counts]).mean(axis=1)
+    )
 
 
 def _without_units(

@@ -416,8 +416,7 @@ def rate_estimates(
     of_judge = _share_moments(n_judged, 0, naive, naive, naive, 0.0)
     # each is divided by 1 where there is none of the kind
     sensitivity = float(y @ f) / max(n_positive, 1), n_positive
-    of_rest = float((1.0 - y) @ (1.0 - f))
-    specificity = of_rest / max(n - n_positive, 1), n - n_positive
+    specificity = float((1.0 - y) @ (1.0 - f)) / max(n - n_positive, 1), n - n_positive
     return RateEstimates(
         rows=(
             _powered(of_judge, 0.0, level, "naive"),

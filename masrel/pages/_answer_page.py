@@ -102,8 +102,7 @@ def answer_page(
         ]
     blocks = [block for section in sections for block in section.blocks]
     drawn = [block.name for block in blocks if isinstance(block, Drawing)]
-    how_made = methods(file, questions, answers, drawn, items)
-    sections.append(_methods_section(*how_made))
+    sections.append(_methods_section(*methods(file, questions, answers, drawn, items)))
     _, sentence = result_sentence(answers, items)
     options = {**(reading or {}), **questions.record()}
     listed = ", ".join(f"{name} {of}" for name, of in options.items() if of is not None)

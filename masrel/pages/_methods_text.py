@@ -135,12 +135,11 @@ def methods(
         for text in _TEXTS.get(name, ())
         if has_ends or not text.is_of_ends
     )
-    units = "clusters" if file.read.get("clusters") else "items"
     texts = (
         _of_data(file, items),
         _of_coefficients(rows, used, questions.metric),
         *_of_intervals(rows, used, items, questions.metric),
-        *_of_tables(also, used, units),
+        *_of_tables(also, used, "clusters" if file.read.get("clusters") else "items"),
         _SOFTWARE.format(*map(version, ("masrel", "numpy", "scipy"))),
     )
     return " ".join(filter(None, texts)), tuple(dict.fromkeys(used))
@@ -392,8 +391,7 @@ def _of_intervals(
     for row in rows:
         interval = row.estimate.interval
         if interval is not None and not math.isnan(interval.low):
-            of_kind = titles.setdefault(_kind(interval, items), {})
-            of_kind[_in_words(row, metric)] = None
+            titles.setdefault(_kind(interval, items), {})[_in_words(row, metric)] = None
             used += interval_references(interval)
     for (kind, to, method, references), of in titles.items():
         which = "" if len(titles) == 1 else f" of {joined(list(of))}"

@@ -464,11 +464,10 @@ def _components(seen: PartSeen) -> Drawing | None:
     names = [row.estimate.coefficient for of in seen.answers for row in of.estimates]
     if seen.coded is None or not any(name.startswith("icc") for name in names):
         return None
-    parts = variance_components(seen.coded)
     return seen.drawing(
         "components",
         "masrel.plots._rater_pairs:components_picture",
-        (parts,),
+        (variance_components(seen.coded),),
         "Variance of a rating: between items, between raters, and the rest, as shares.",
     )
 
@@ -477,13 +476,12 @@ def _items(seen: PartSeen) -> Drawing | None:
     if seen.coded is None or seen.disputed.size == 0 or len(seen.raters) > _MOST_RATERS:
         return None
     shown, scale = seen.disputed, seen.file.scale
-    names = [seen.items[place] for place in shown]
     return seen.drawing(
         "items",
         f"{_GRADES}:items_picture",
         (
             seen.coded.codes[shown],
-            names,
+            [seen.items[place] for place in shown],
             seen.raters,
             scale.grades,
             seen.file.is_ordered,

@@ -228,8 +228,7 @@ def _events(design: Design, outcomes: Floats) -> Floats:
     if study.lower is not None or study.upper is not None:
         lower, upper = limits_of(study)
         is_power = study.power is not None and study.null is None
-        is_inside = (low >= lower) & (high <= upper)
-        events["power" if is_power else "assurance"] = is_inside
+        events["power" if is_power else "assurance"] = (low >= lower) & (high <= upper)
     if study.half_width is not None:
         events["assurance"] = half <= study.half_width * (1.0 + _LEAST)
     is_lower = study.lower is not None or study.upper is None

@@ -179,8 +179,7 @@ def forest_picture(
             for ridge in ridges
             for places, heights in ridge.values()
         ]
-        left = max(min([0.0, *values, *ends, *lowest]), _LEFT) - 0.05
-        axes.set_xlim(left, right)
+        axes.set_xlim(max(min([0.0, *values, *ends, *lowest]), _LEFT) - 0.05, right)
         axes.set_ylim(_draw_rows(axes, rows, ridges) + 0.05, 0.0)
         if mark is not None:
             axes.axvline(mark[0], **_MARK)

@@ -137,8 +137,9 @@ def confusion(
     pairs = (coded.codes[:, [row, place]] for place in others)
     counts = np.sum([pair_table(of, len(labels)) for of in pairs], axis=0)
     column = names[others[0]] if len(others) == 1 else f"{len(others)} other raters"
-    pair = names[row], column
-    return shown(confusion_picture(counts, labels, pair, is_ordered), ax)
+    return shown(
+        confusion_picture(counts, labels, (names[row], column), is_ordered), ax
+    )
 
 
 def _read(
@@ -461,8 +462,7 @@ def items(
         (len(rows) != n, f"items: needs a name for each of {n}, got {len(rows)}"),
         (n_shown < 1, f"n_shown: needs at least 1 item, got {n_shown}"),
     )
-    has_weights = is_ordered and len(labels) > 1
-    weights = "linear" if has_weights else "identity"
+    weights = "linear" if is_ordered and len(labels) > 1 else "identity"
     disagreement = item_disagreement(replace(coded, declared=True), weights=weights)
     chosen = np.argsort(-disagreement, kind="stable")[:n_shown]
     picture = items_picture(

@@ -231,9 +231,8 @@ def _draw_lines(axes: Axes, panel: "Limits") -> None:
             transform=across,
         )  # fmt: skip
         axes.plot(places, values, linewidth=1.2, zorder=2.0, transform=across, **look)
-        text = fixed_or_significant(values[-1], 2).replace("-", "−")
         axes.annotate(
-            f"{name}\n{text}",
+            f"{name}\n{fixed_or_significant(values[-1], 2).replace('-', '−')}",
             (1.0, values[-1]),
             xycoords=("axes fraction", "data"),
             xytext=(4, 0),

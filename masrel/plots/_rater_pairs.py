@@ -322,8 +322,7 @@ def _influence(
     axes: Axes, result: "Diagnosis", order: NDArray[np.intp], cell: float
 ) -> None:
     places = np.arange(len(order))
-    ends = result.change_low[order], result.change_high[order]
-    axes.hlines(places, *ends, **_LINE)
+    axes.hlines(places, result.change_low[order], result.change_high[order], **_LINE)
     axes.plot(result.changes[order], places, markersize=min(12.0 * cell, 4.5), **_DOT)
     axes.set_ylim(len(order) - 0.5, -0.5)
     axes.axvline(0.0, color=GREY, linewidth=0.8, linestyle=DASHES, zorder=0.5)
@@ -337,5 +336,4 @@ def _influence(
         Line2D([], [], label="estimate", **_DOT),
         Line2D([], [], label=f"{percent(result.level)} % confidence interval", **_LINE),
     ]
-    has_ends = bool(np.isfinite(result.change_low).any())
-    legend_below(axes, marks[: 1 + has_ends])
+    legend_below(axes, marks[: 1 + bool(np.isfinite(result.change_low).any())])

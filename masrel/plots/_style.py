@@ -312,9 +312,8 @@ def lay_out(figure: Figure, stamp: str) -> None:
     if stamp:
         is_loud = stamp.isupper()
         # 7 pt letters are about 0.054 in wide; a long source goes on two lines
-        n_letters = int(figure.get_figwidth() / 0.054) - 2
         figure.suptitle(
-            textwrap.fill(stamp, n_letters),
+            textwrap.fill(stamp, int(figure.get_figwidth() / 0.054) - 2),
             x=0.995,
             ha="right",
             va="top",

@@ -332,8 +332,7 @@ def _is_no_rater(sheet: Sheet, place: int, lower: set[str]) -> bool:
     is_sum = _is_sum(words) and not _is_of_series(name, sheet.header)
     # Kim=Lee, mean of Kim and Lee
     of_two = len((words & lower) - {name.lower()}) > 1
-    is_other = bool(words & _SURE or _OTHERS.fullmatch(name))
-    return is_other or is_flag or is_sum or of_two
+    return bool(words & _SURE or _OTHERS.fullmatch(name)) or is_flag or is_sum or of_two
 
 
 def called_gold(name: str) -> bool:
@@ -486,10 +485,9 @@ def doubt_counts(
     if layout.kind == "table" or not layout.item:
         return findings
     name, column = sheet.header[layout.item[0]], sheet.columns[layout.item[0]]
-    are_counts = all(text.isdecimal() for text in column.texts)
     if (
         layout.is_item_guessed
-        and are_counts
+        and all(text.isdecimal() for text in column.texts)
         and not (ITEM_NAME.fullmatch(name) or numbers_rows(sheet, layout.item[0]))
     ):
         raise sheet.refuse("category or item", column=name, name=quoted([name]))

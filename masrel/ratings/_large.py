@@ -98,8 +98,7 @@ def source_of(path: Path, options: Reading) -> Source:
     """Open a file for DuckDB."""
     is_other = options.transpose or options.source or options.sheet
     kind = path.suffix.lower()
-    has_duckdb = options.stream or find_spec("duckdb")
-    if path.is_file() and has_duckdb and not is_other:
+    if path.is_file() and (options.stream or find_spec("duckdb")) and not is_other:
         has_names = not (options.no_header or options.names_at)
         if kind == ".parquet" and options.encoding is None and has_names:
             return _parquet(path, options)

@@ -772,9 +772,8 @@ def checked_records(
             records = records[: len(records) - is_closed]
             wrong = (k for k, record in enumerate(records) if len(record) != width)
             if (k := next(wrong, None)) is not None:
-                code = "open quote" if records[k][-1].endswith(_END) else "width"
                 raise sheet.refuse(
-                    code,
+                    "open quote" if records[k][-1].endswith(_END) else "width",
                     where=sheet.at(n_rows + k),
                     width=width,
                     n=len(records[k]),

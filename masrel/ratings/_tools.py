@@ -98,13 +98,12 @@ def _prodigy(path: str, task: _Record) -> Iterator[Annotation]:
     is_choice = "accept" in task or "options" in task
     if answer == "ignore" or (is_choice and answer != "accept"):
         why = f"answered {answer or 'nothing'}"
-    regions = task.get("spans") or task.get("relations")
     if is_choice:
         grades = {"accept": task.get("accept", [])}
     elif task.get("label") is not None:
         grades = {str(task["label"]): answer}
     else:
-        grades = {"answer": regions or answer}
+        grades = {"answer": task.get("spans") or task.get("relations") or answer}
     who = task.get("_session_id") or PurePosixPath(path).name
     yield Annotation(
         task.get("_input_hash"),
@@ -246,11 +245,10 @@ def _langsmith(_: str, feedback: _Record) -> Iterator[Annotation]:
     # of a judge the user is who runs it
     person = source.get("user_name") or source.get("user_id")
     score = feedback.get("score")
-    grade = feedback.get("value") if score is None else score
     yield Annotation(
         feedback["run_id"],
         person if kind == "human" else source.get("type"),
-        {feedback["key"]: grade},
+        {feedback["key"]: feedback.get("value") if score is None else score},
         kind=kind,
         cluster=feedback.get("trace_id"),
     )

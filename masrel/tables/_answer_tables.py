@@ -476,8 +476,7 @@ def word_of(row: AgreementRow, bands: BandScale) -> str | None:
     """Return the best word that the true value reaches with 95 % probability."""
     estimate = row.estimate
     entry = COEFFICIENTS.get(estimate.coefficient)  # none of kappa of a category
-    is_raw = entry is not None and not entry.chance_corrected
-    if is_raw or math.isnan(estimate.value):
+    if (entry is not None and not entry.chance_corrected) or math.isnan(estimate.value):
         return None
     if row.lower_bound is not None:
         return strength(row.lower_bound, scale=bands)
@@ -528,8 +527,7 @@ def _interval_note(interval: Interval, detail: Detail, noun: Noun) -> str:
     ends = "bound" if interval.is_one_sided else "interval"
     kind = f"credible {ends}" if interval.kind == "credible" else "CI"
     name = f"{percent(interval.level)} % {kind}, {interval.method}"
-    population = _population(interval).replace("item", noun)
-    to = f": generalises to {population} like these"
+    to = f": generalises to {_population(interval).replace('item', noun)} like these"
     if detail == "all":
         return f"{name}{origin(interval, noun)}{to}: {promise(interval, noun)}"
     return name + to

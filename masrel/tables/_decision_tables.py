@@ -1,7 +1,7 @@
 """The tables, the JSON and the curves of a generalizability study."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
@@ -39,23 +39,9 @@ def _ends(of: str, interval: Any) -> Row:
     )
 
 
-def _component_rows(study: GStudy) -> Iterator[Row]:
-    total = sum(max(part, 0.0) for part in study.components.values()) or math.nan
-    for source, part in study.components.items():
-        yield {
-            "source": source,
-            "df": study.df.get(source),
-            "mean_square": study.mean_squares.get(source),
-            "variance": part,
-            "share": max(part, 0.0) / total,
-            **_ends("", study.intervals[source]),
-        }
-
-
 def _design_row(design: DStudy) -> Row:
-    row: Row = dict(design.sizes)
-    for name in ("universe", "relative_error", "absolute_error", "cost"):
-        row[name] = getattr(design, name)
+    names = ("universe", "relative_error", "absolute_error", "cost")
+    row: Row = {**design.sizes, **{name: getattr(design, name) for name in names}}
     for of in _COEFFICIENTS:
         row[of] = getattr(design, of)
         interval = getattr(design, f"{of.removesuffix('_dependability')}_interval")
@@ -128,8 +114,19 @@ def study_tables(
     data: str,
 ) -> tuple[list[Table], dict[str, object]]:
     """Return components, designs and single ratings as tables, and for JSON."""
+    total = sum(max(part, 0.0) for part in study.components.values()) or math.nan
     rows: dict[str, list[Row]] = {
-        "components": [*_component_rows(study)],
+        "components": [
+            {
+                "source": source,
+                "df": study.df.get(source),
+                "mean_square": study.mean_squares.get(source),
+                "variance": part,
+                "share": max(part, 0.0) / total,
+                **_ends("", study.intervals[source]),
+            }
+            for source, part in study.components.items()
+        ],
         "d_study": [_design_row(design) for design in designs],
         "single_ratings": [
             {"shared": shared, **_design_row(design)}

@@ -173,10 +173,9 @@ def planning_toml(plan: Plan, *, line: str | None = None) -> str:
     """Return the lines of a protocol that ask for what was planned, and say why."""
     # line: of a protocol that has it already
     name = line or f"planned-{plan.coefficient.replace('_', '-')}"
-    head = () if line else _estimate_lines(plan, name)
     return "\n".join(
         (
-            *head,
+            *(() if line else _estimate_lines(plan, name)),
             f"# {planning_sentence(plan)}",
             "[[analysis.sample_sizes]]",
             f'estimate = "{name}"',

@@ -166,8 +166,8 @@ def as_entered(value: float) -> str:
     """Return a number that somebody chose with the digits it was entered with."""
     if not math.isfinite(value):
         return UNDEFINED
-    text = f"{Decimal(repr(float(value))):f}"  # no exponent
-    return text.removesuffix(".0").replace("-", "−")
+    # without an exponent
+    return f"{Decimal(repr(float(value))):f}".removesuffix(".0").replace("-", "−")
 
 
 def percent(share: float) -> str:

@@ -212,9 +212,11 @@ def latent_trait(
     ...     ratings, items="fixed", categories=[1, 2, 3, 4], rng=1
     ... )
     """
-    refuse((items not in _TARGETS, f'items: needs "fixed" or "random", got {items!r}'))
+    refuse(
+        (items not in _TARGETS, f'items: needs "fixed" or "random", got {items!r}'),
+        (min(n_steps, max_steps) < 20, "n_steps, max_steps: need at least 20"),
+    )
     check_level(level)
-    refuse((min(n_steps, max_steps) < 20, "n_steps, max_steps: need at least 20"))
     checked = _Ratings.of(ratings, categories)
     generator, seed = recorded_generator(rng)
     seeds = generator.integers(2**63, size=2).tolist()
@@ -464,8 +466,7 @@ def _kappa(
     notes: tuple[str, ...] = ()
     if other is not None and other.kappa.interval is not None:
         low, high = other.kappa.interval.low, other.kappa.interval.high
-        words = other.prior.words
-        notes = (f"under another prior {low:.3f} to {high:.3f}: {words}",)
+        notes = (f"under another prior {low:.3f} to {high:.3f}: {other.prior.words}",)
     interval = replace(
         _interval(question, draws),
         notes=notes,
