@@ -105,8 +105,16 @@ def test_it_refuses_a_torque_above_its_own_limit() -> None:
     ("fault", "failed"),
     [
         (None, []),
-        (InjectedFault(kind="foreign-frames", start_s=0.0), []),
-        (InjectedFault(kind="late-replies", start_s=0.0, size=0.0006), ["answers"]),
+        pytest.param(
+            InjectedFault(kind="foreign-frames", start_s=0.0),
+            [],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            InjectedFault(kind="late-replies", start_s=0.0, size=0.0006),
+            ["answers"],
+            marks=pytest.mark.slow,
+        ),
         (InjectedFault(kind="board-fault", start_s=0.01), ["torque mode"]),
     ],
 )

@@ -76,7 +76,7 @@ FAULTS: list[tuple[str, InjectedFault, str | None]] = [
 ]
 QUICK = {"torques lost for good", "answers late by 3 ms", "a position is no number"}
 QUICK |= {"stopped from outside", "motor without current", "code 34: over-voltage"}
-QUICK |= {"bus off for good", "answers late by 4 ms"}
+QUICK |= {"bus off for good", "answers late by 4 ms", "code 103"}
 OUT_OF_REACH = {"bus off for good", "cable out for good", "requests lost for good"}
 NO_WORD = {"answers lost for good", "answers are the one before"}
 NO_WORD |= {"answers under another number", *OUT_OF_REACH}
