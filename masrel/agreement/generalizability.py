@@ -414,7 +414,8 @@ def _cells(
     cells = {}
     for columns in effects.values():
         cell = np.zeros(n_ratings, dtype=np.int64)
-        for name in columns:
+        # a set's order is another in each run, and so would rounding be
+        for name in filter(columns.__contains__, codes):
             cell = cell * (codes[name].max() + 1) + codes[name]
             cell = np.unique(cell, return_inverse=True)[1]
         cells[columns] = cell
