@@ -445,7 +445,7 @@ def next_step(
         why = f"the log of {session.rater} in session {session.session} is damaged"
         return _step(study, "verify", why)
     if any(change.time_utc is None for change in changes):
-        why = "the plan has changed since the draw, and nobody has recorded it"
+        why = "the plan has changed since the draw, and the change is not recorded yet"
         return _step(study, "record amend", why, " --who WHO --why WHY")
     if "not drawn" in by_stage and "begun" not in by_stage:
         n_left = sum(each.stage == "not drawn" for each in open_)
@@ -536,7 +536,7 @@ def _to_make(
     # of sessions that are complete: each output is made after what it is made of
     done = "all sessions are complete"
     if n_open:
-        done = f"{n_open} of {len(sessions)} sessions cannot begin any more"
+        done = f"{n_open} of {len(sessions)} sessions can no longer begin"
     elif (secret := find_secret(study)) is not None and secret.site is None:
         places = [(each.rater, each.session) for each in sessions]
         drawn = _read_drawn(study, places, skips_damaged=True)

@@ -122,7 +122,7 @@ def test_what_the_protocol_says_of_its_size_is_taken(
     done = masrel("plan", study, "--json", "-")
     (plan,) = json.loads(done.out)["plans"]
     assert (plan["value"], plan["interval"]) == (0.7, "auto")
-    assert "note: kappa: 5 items were planned for, the study has 4" in done.err
+    assert "note: kappa: the plan is for 5 items, but the study has 4" in done.err
 
 
 @pytest.mark.parametrize(

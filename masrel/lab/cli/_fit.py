@@ -101,14 +101,15 @@ _recordings = grouped(
     click.option(
         "--unit",
         "units",
-        help="Unit of a column whose name has none: time=ms, angle=deg, torque=nm.",
+        help="Unit of a column whose name does not give one: time=ms, angle=deg, "
+        "torque=nm.",
         metavar="QUANTITY=TEXT",
         multiple=True,
     ),
     click.option(
         "--column",
         "columns",
-        help="Name of a column that is called otherwise: torque='Moment'.",
+        help="Column that holds a quantity, if its name differs: torque='Moment'.",
         metavar="QUANTITY=TEXT",
         multiple=True,
     ),
@@ -118,11 +119,12 @@ _figures = click.option(
     "--figures",
     "folder",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Draw the fit as PNG and SVG files in this folder.",
+    help="Save figures of the fit as PNG and SVG files in this folder.",
 )
 _output = output_options(
-    json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
-    quiet="Show no progress.",
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else.",
+    quiet="Do not show progress.",
     makes_folder=True,
 )
 
@@ -135,9 +137,9 @@ _output = output_options(
 def friction(
     recordings: _Recordings, level: float, folder: Path | None, output: OutputOptions
 ) -> None:
-    """Fit (7), the friction of a device, to RECORDINGS of backdriving.
+    """Fit the friction of a device, equation (7), to RECORDINGS of backdriving.
 
-    Recordings are as those of masrel joint fit.
+    Recordings have the same format as for masrel joint fit.
     """
     from masrel.lab.elbow.identification import fit_friction
 
@@ -154,45 +156,51 @@ def friction(
     "--output",
     "model_file",
     type=OutputFile(path_type=Path),
-    help="Write the model file here, for a protocol to name.",
+    help="Write a model file for use in a protocol.",
 )
 @click.option(
     "--slow-below",
     "slow_below",
     type=float,
-    help="Stretches below this speed are slow, deg/s; default: 20, the threshold.",
+    help="Speed in deg/s below which a stretch is slow; default: 20, the catch "
+    "threshold.",
 )
 @click.option(
     "--inertia",
     type=click.Choice(["zero", "fitted"]),
     default="zero",
     show_default=True,
-    help="Whether m of (1) is fitted.",
+    help="Whether the inertia, m in equation (1), is fixed at zero or fitted.",
 )
 @click.option(
     "--post-catch",
     type=click.Choice(["continuous", "additive"]),
     default="continuous",
     show_default=True,
-    help="How (5) is read.",
+    help="Reading of equation (5), the torque after the catch.",
 )
-@_term("--gravity", "Weight of the arm, m·g·l, N·m: adds m·g·l·sin(angle).")
+@_term("--gravity", "Torque of the arm's weight, m·g·l in N·m; adds m·g·l·sin(angle).")
 @click.option(
     "--gravity-angle",
     type=float,
     default=0.0,
     show_default=True,
-    help="Angle at which the weight has no torque, deg.",
+    help="Angle in deg at which the weight exerts no torque.",
 )
 @_term("--arm-inertia", "Inertia of the arm in every phase, kg·m².")
-@_term("--offset", "Constant torque of a trial, N·m: the sensor's zero.", "fitted")
-@_term("--drift", "What the offset gains, N·m/s; fitted for each trial.")
+@_term(
+    "--offset",
+    "Constant torque in each trial, N·m: the sensor's zero offset.",
+    "fitted",
+)
+@_term("--drift", "Drift of the offset, N·m/s; fitted for each trial.")
 @_term("--lag", "Time constant of the torque sensor, s.")
-@_term("--rise", "How long a catch takes to its peak, s.")
+@_term("--rise", "Time that a catch takes to reach its peak, s.")
 @click.option(
     "--compare",
     is_flag=True,
-    help="Also fit with each of these, and compare by leaving trials out.",
+    help="Also fit with each further term of the arm, and compare by leaving trials "
+    "out.",
 )
 @_level
 @_figures
@@ -206,13 +214,13 @@ def fit(
     output: OutputOptions,
     **of_joint: Any,
 ) -> None:
-    """Identify the joint behind RECORDINGS of slow and fast stretches.
+    """Estimate a joint's parameters from RECORDINGS of slow and fast stretches.
 
-    A recording is a CSV file or an npz archive with time, angle and torque, the unit
-    in each column's name (time_s, angle_deg, torque_nm), or one of masrel run: then its
-    measured torque, or else the model's. Prints every parameter with its confidence
-    interval, clustered by trial, what these trials do not determine, and
-    whether the law fits them.
+    A recording is a CSV file or an npz archive with time, angle and torque, and with
+    the unit in each column's name (time_s, angle_deg, torque_nm). It may also be a
+    recording of masrel run, of which the measured torque is used or, if there is none,
+    the model's. Prints every parameter with its confidence interval (clustered by
+    trial), the parameters that these trials do not determine, and whether the law fits.
     """
     slow_below = of_joint["slow_below"]
     if slow_below is not None and not 0.0 < slow_below < math.inf:

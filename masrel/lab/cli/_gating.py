@@ -55,9 +55,9 @@ def gate_options() -> Decorator:
             "--require",
             multiple=True,
             metavar="GATE",
-            help="Exit with 1 unless a number keeps a limit, as 'kappa.low >= 0.4': "
-            "value, low, high, width, n, n_missing or p of an estimate of the plan; "
-            "winning_rate or advantage of a judge of it.",
+            help="Exit with 1 unless this condition is met, such as 'kappa.low >= "
+            "0.4'. It names value, low, high, width, n, n_missing or p of a planned "
+            "estimate, or winning_rate or advantage of a planned judge.",
         ),
         click.option(
             "--junit",
@@ -157,7 +157,7 @@ def _words(planned: "PlannedEstimate") -> str:
 def _absence(planned: "PlannedEstimate") -> str | None:
     # why there is no number, or None
     if planned.estimate is None:
-        return planned.reason or "there is none of all raters together"
+        return planned.reason or "there is no estimate for all raters together"
     if math.isnan(planned.estimate.value):
         return planned.estimate.reason
     return None

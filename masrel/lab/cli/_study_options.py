@@ -50,7 +50,8 @@ session_option = click.option("--session", required=True, help="Id of the sessio
 clock_option = click.option(
     "--clock",
     type=click.Choice(["real", "simulated"]),
-    help="Clock of the control loop; default: real, for simulated grades simulated.",
+    help="Clock of the control loop; default: simulated for simulated grades, "
+    "otherwise real.",
 )
 
 
@@ -87,8 +88,8 @@ def grading(
 stamp_option = click.option(
     "--stamp",
     metavar="URL",
-    help="Have the file stamped by this service (RFC 3161), and keep its answer beside "
-    "it.",
+    help="Have the file time-stamped by this service (RFC 3161) and keep its reply "
+    "beside the file.",
 )
 
 
@@ -105,8 +106,8 @@ ratings_option = click.option(
     "--ratings",
     "ratings_file",
     type=InputFile(path_type=Path),
-    help="File of ratings to use whatever the session logs say; default: what they "
-    "say, and without logs the study's ratings.csv, else published.csv.",
+    help="File of ratings to use instead of the session logs. Default: the session "
+    "logs, or without logs the study's ratings.csv, or else its published.csv.",
 )
 
 

@@ -55,8 +55,8 @@ def _cells(
             planned, actual = getattr(size, name, arguments[name]), arguments[name]
             if planned != actual:  # a study that is not as large as was planned
                 click.echo(
-                    f"note: {line.id}: {planned} {words} were planned for, the study "
-                    f"has {actual}",
+                    f"note: {line.id}: the plan is for {planned} {words}, but the "
+                    f"study has {actual}",
                     err=True,
                 )
         usual = _USUAL_VALUES if size is None else (size.value,)

@@ -113,27 +113,28 @@ _motion_options = grouped(
         "--motion", "kind", type=click.Choice(_KINDS), default="constant",
         show_default=True,
     ),
-    click.option("--from-deg", "start", type=float, help="[default: 30]"),
-    click.option("--to-deg", "end", type=float, help="[default: 146]"),
+    click.option("--from-deg", "start", type=float, help="Start.  [default: 30]"),
+    click.option("--to-deg", "end", type=float, help="End.  [default: 146]"),
     click.option(
         "--acceleration-deg-s2", "acceleration", type=float,
-        help="Of a trapezoid's ramps.",
+        help="Acceleration of a trapezoid's ramps.",
     ),
     click.option(
         "--recording", type=InputFile(path_type=Path),
-        help="CSV with time_s and angle_deg, or npz.",
+        help="Recorded motion: CSV with time_s and angle_deg, or npz.",
     ),
     click.option(
         "--interpolation", type=click.Choice(["pchip", "linear"]),
-        help="Between the samples of a recording.  [default: pchip]",
+        help="Interpolation between the samples of a recording.  [default: pchip]",
     ),
     click.option("--stop-at-s", "stop", type=float, help="Stop the arm at this time."),
     click.option(
-        "--pause-s", "pause", type=float, help="And hold it for as long as this."
+        "--pause-s", "pause", type=float,
+        help="Hold the stopped arm for this long.",
     ),
     click.option(
         "--repeat", "repeats", type=int, default=1, show_default=True,
-        help="Stretch so often, flexing in between as the stretch was made.",
+        help="Number of stretches; in between the arm is flexed by the reverse motion.",
     ),
 )  # fmt: skip
 
@@ -143,14 +144,15 @@ _quantity_options = grouped(
     Quantities,
     click.option(
         "--output", "outputs", type=click.Choice(tuple(SCENE_OUTPUTS)), multiple=True,
-        help="What to compute beside events and peak; may be given again.",
+        help="Compute this in addition to events and peak. Repeatable.",
     ),
     click.option(
-        "--at-s", "times", type=float, multiple=True, help="Torque at this time."
+        "--at-s", "times", type=float, multiple=True,
+        help="Compute the torque at this time.",
     ),
     click.option(
         "--at-deg", "angles", type=float, multiple=True,
-        help="Torque where this angle is first reached.",
+        help="Compute the torque where this angle is first reached.",
     ),
 )  # fmt: skip
 
@@ -159,7 +161,7 @@ _quantity_options = grouped(
 @joint_options
 @click.option(
     "--speed-deg-s", "speeds", type=float, multiple=True,
-    help="Mean speed, deg/s; of a trapezoid that of its level. May be given again.",
+    help="Mean speed in deg/s, or the speed of the plateau of a trapezoid. Repeatable.",
 )  # fmt: skip
 @click.option(
     "--speeds-deg-s", "speed_range",
@@ -170,24 +172,25 @@ _quantity_options = grouped(
 @_quantity_options
 @click.option(
     "--rate-hz", type=click.FloatRange(min=0.0, min_open=True),
-    help="Samples a second of --csv.  [default: 1000]",
+    help="Samples per second of --csv.  [default: 1000]",
 )  # fmt: skip
 @click.option(
     "--csv",
     "csv_file",
     type=FileInFolder(path_type=Path),
-    help="Write the samples here.",
+    help="Write the samples to this file.",
 )
 @output_options(
-    json="Write events and outputs as JSON here; - for the screen.",
-    figure="Draw this file: .png, .svg or .pdf.",
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else.",
+    figure="Save a figure as .png, .svg or .pdf.",
 )
 @click.option(
     "--view", type=click.Choice(SCENE_VIEWS),
-    help="What --figure shows: torque by angle or time, the catches, or one of "
-    "them.  [default: angle]",
+    help="What --figure shows: torque by angle or by time, the catches, or a schematic "
+    "of one catch.  [default: angle]",
 )  # fmt: skip
-@click.option("--quiet", is_flag=True, help="Show no progress.")  # of the output
+@click.option("--quiet", is_flag=True, help="Do not show progress.")  # of the output
 def trace(
     joints: JointOptions,
     speeds: tuple[float, ...],
@@ -199,10 +202,11 @@ def trace(
     output: OutputOptions,
     view: str | None,
 ) -> None:
-    """Phases, peak torque and samples of stretches of models.
+    """Compute phases, peak torque and samples of stretches of models.
 
     Events and outputs are exact; the samples of --csv are what the controller commands
-    at --rate-hz for that motion. Several models or speeds make one scene of each pair.
+    at --rate-hz for this motion. With several models or speeds, every combination is
+    one scene.
     """
     refuse(
         (

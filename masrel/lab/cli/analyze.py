@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 @ratings_option
 @gate_options()
 @output_options(
-    json="Write the analysis here; - prints it, and nothing else, on stdout.",
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else.",
     csv="Print the tables as CSV.",
     makes_folder=True,
 )
@@ -36,9 +37,9 @@ def analyze(
     gating: GateOptions,
     output: OutputOptions,
 ) -> None:
-    """Compute what the plan of STUDY asks for.
+    """Compute the analysis that the plan of STUDY asks for.
 
-    Prints the tables and writes STUDY/analysis.json, or the file of --json.
+    Prints the tables and writes STUDY/analysis.json, or the file named by --json.
     """
     from masrel.lab import analysis as library
     from masrel.lab.report import study_conduct

@@ -21,7 +21,7 @@ from masrel.tables._tables import counted
 @study_argument
 @read_once()
 def check(study: Path) -> None:
-    """Check protocol, schedules, record and ratings of STUDY; say every problem."""
+    """Check the protocol, schedules, record and ratings and list every problem."""
     paths = StudyPaths(study)
     notes: list[str] = []
     try:

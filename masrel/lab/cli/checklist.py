@@ -17,21 +17,21 @@ from masrel.lab.protocol import Protocol, StudyPaths
     "--guideline",
     required=True,
     type=click.Choice(["grras", "cosmin"]),
-    help="GRRAS, 15 items; or the design standards of COSMIN, 6 items.",
+    help="GRRAS (15 items), or the design standards of COSMIN (6 items).",
 )
 @click.option(
     "-o",
     "--output",
     type=OutputFile(path_type=Path),
-    help="File to write: .html, .md or .docx; Markdown on the screen unless given.",
+    help="File to write (.html, .md or .docx); without it Markdown is printed.",
 )
 def checklist(
     study: StudyPaths, protocol: Protocol, guideline: str, output: Path | None
 ) -> None:
-    """Fill the checklist of a reporting guideline for STUDY.
+    """Fill in the checklist of a reporting guideline for STUDY.
 
-    Each item has what the protocol, the schedules, the logs and the analysis say of it,
-    with the files and their hashes; what only the authors know is left to them.
+    Each item is filled in from the protocol, schedules, logs and analysis, with the
+    files used and their hashes. What only the authors know is left for them to add.
     """
     from masrel.lab.checklist import checklist_markdown, fill_checklist, write_checklist
 

@@ -23,22 +23,22 @@ _DAY = datetime(2012, 1, 1, tzinfo=UTC)
     "--study",
     "template",
     metavar="NAME",
-    help="Bundled study to run.  [default: hess2012, and tone after it]",
+    help="Bundled study to run.  [default: hess2012, then tone]",
 )
 @click.option(
     "--device",
     type=click.Choice(["simulated", "puck", "moteus"]),
     default="simulated",
     show_default=True,
-    help="What presents the models; a puck or a moteus is emulated.",
+    help="Device that presents the models; a puck or a moteus is emulated.",
 )
-@output_options(quiet="No progress bars.")
+@output_options(quiet="Show no progress bars.")
 def demo(out: Path, template: str | None, device: str, output: OutputOptions) -> None:
-    """Run a complete simulated study in OUT and report it, and the published one.
+    """Run a complete simulated study in OUT; report it and the published study.
 
-    After it comes a small study of other tone than spasticity.
+    A small study of tone other than spasticity follows.
 
-    OUT must not exist or be empty. The same seed gives the same schedules, ratings,
+    OUT must be a new or empty folder. The same seed gives the same schedules, ratings,
     analysis and reports, byte for byte.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):

@@ -46,46 +46,50 @@ _device_options = several(
         type=click.Choice(list(_BACKENDS)),
         default="puck",
         show_default=True,
-        help="Which amplifier.",
+        help="Type of amplifier.",
     ),
     click.option(
         "--interface",
-        help="The adapter, as python-can names it; default: socketcan, with --emulate "
-        "virtual.",
+        help="Bus adapter, as python-can names it; default: socketcan, or virtual with "
+        "--emulate.",
     ),
-    click.option("--channel", default="can0", show_default=True, help="Its channel."),
+    click.option(
+        "--channel", default="can0", show_default=True, help="Channel of the adapter."
+    ),
     click.option(
         "--node",
         "--puck",
         type=int,
         default=1,
         show_default=True,
-        help="Its number on the bus.",
+        help="Number of the amplifier on the bus.",
     ),
     click.option(
         "--direction",
         type=click.Choice(["1", "-1"]),
         default="1",
         show_default=True,
-        help="-1 where its counts shrink with extension.",
+        help="-1 if the encoder counts decrease as the arm extends.",
     ),
     click.option(
         "--gear-ratio",
         type=float,
-        help="Turns of the motor, or of a moteus' output, for one of the elbow; "
-        "default: 18.8 and 1.",
+        help="Turns of the motor per turn of the elbow, or turns of the output for a "
+        "moteus; default: 18.8 for a puck, 1 for a moteus.",
     ),
     click.option(
         "--properties",
         type=InputFile(path_type=Path),
-        help="TOML file with the property numbers of a puck's firmware that is unknown "
-        "to masrel.",
+        help="TOML file with property numbers, for a puck whose firmware masrel does "
+        "not know.",
     ),
     click.option(
-        "--emulate", is_flag=True, help="Emulate it; there is no hardware then."
+        "--emulate", is_flag=True, help="Emulate the amplifier; no hardware is needed."
     ),
     output_options(
-        json="Write what was found as JSON; - for the screen.", quiet="No progress bar."
+        json='Write JSON to this file; "-" writes it to standard output and prints '
+        "nothing else.",
+        quiet="Show no progress bar.",
     ),
 )
 
@@ -184,18 +188,19 @@ def _free_hand() -> SimulatedHand:
 
 @click.group("device", cls=Commands)
 def device() -> None:
-    """Bring a Barrett Puck up on its CAN bus.
+    """Bring up a Barrett Puck or a moteus on its CAN bus.
 
-    In this order: probe asks who is there, check looks whether a puck can be driven,
-    zero tells it where the arm is, friction turns the free arm. What to make of it
-    is in docs/howto/laboratory/hardware.md. To try them: --emulate.
+    Run these in order: probe lists the nodes on the bus, check tests whether the
+    amplifier can be driven, zero sets the position of the arm, and friction turns the
+    free arm. docs/howto/laboratory/hardware.md explains the results. To try the
+    commands without hardware, add --emulate.
     """
 
 
 @device.command("probe")
 @_device_command
 def _probe(session: _Session) -> None:
-    """Ask every node who it is; nothing is set and nobody is woken."""
+    """Ask every node to identify itself; nothing is set and no node is woken."""
     n_nodes = _N_NODES[session.name]
     with session.link(all_nodes=True) as link, session.progress(n_nodes) as bar:
         reports = session.backend.probe(
@@ -212,11 +217,11 @@ def _probe(session: _Session) -> None:
 @device.command("check")
 @_device_command
 def _check(session: _Session) -> None:
-    """See whether an amplifier can be driven. The arm must be at rest.
+    """Check whether an amplifier can be driven. The arm must be at rest.
 
-    A puck is woken, told its groups and torque limit, and in torque mode for some
-    milliseconds with no more than 0.007 N·m. A moteus is told no torque, and then
-    nothing, so that its watchdog must let go. Both are idle afterwards.
+    A puck is woken, given its groups and torque limit, and put into torque mode for a
+    few milliseconds with at most 0.007 N·m. A moteus is commanded zero torque and then
+    sent nothing, so that its watchdog must let go. Both are idle afterwards.
     """
     with session.link() as link:
         checks = session.backend.check(link, session.clock, session.options)
@@ -243,11 +248,11 @@ def _check(session: _Session) -> None:
     "--angle-deg",
     type=click.FloatRange(0.0, 180.0),
     required=True,
-    help="Where the arm is held now, 0 at full flexion.",
+    help="Current angle of the arm; 0 is full flexion.",
 )
 @_device_command
 def _zero(session: _Session, angle_deg: float) -> None:
-    """Tell it where the arm is; it forgets when its supply is switched off."""
+    """Set the position of the arm, which is lost when the power is switched off."""
     with session.link() as link:
         position = session.backend.zero(
             link, session.clock, session.options, angle=math.radians(angle_deg)
@@ -262,10 +267,10 @@ def _zero(session: _Session, angle_deg: float) -> None:
 @device.command("emulate")
 @_device_command
 def _emulate(session: _Session) -> None:
-    """Be an amplifier for other processes, until Ctrl-C.
+    """Emulate an amplifier for other processes until Ctrl-C is pressed.
 
-    The bus is one that processes of this machine share: udp_multicast, or a vcan of
-    SocketCAN. The arm is free, at 60 deg.
+    The bus must be one that processes on this machine can share: udp_multicast, or a
+    vcan of SocketCAN. The arm is free and starts at 60 deg.
     """
     options, stop = session.options, EmergencyStop()
     if options.moves_hardware or not options.is_shared:
@@ -284,18 +289,18 @@ def _emulate(session: _Session) -> None:
 @click.option(
     "--arm-is-free",
     is_flag=True,
-    help="Say that nobody holds the arm and nothing is in its way: IT MOVES.",
+    help="Confirm that nobody holds the arm and nothing is in its way: IT WILL MOVE.",
 )
 @_device_command
 def _friction(session: _Session, arm_is_free: bool) -> None:
     """Turn the free arm at steady speeds and fit B and β of equation (7).
 
-    The arm moves by itself, between 40 and 115 deg, at up to 80 deg/s, with at most
+    The motor moves the arm between 40 and 115 deg, at up to 80 deg/s and with at most
     2 N·m, for about 20 s.
     """
     if not arm_is_free:
         raise click.UsageError(
-            "the arm will move by itself; when it is free, say --arm-is-free"
+            "the motor will move the arm; when the arm is free, add --arm-is-free"
         )
     stop = EmergencyStop()
     keys = None if session.hand is not None else sys.stdin  # an emulator is quick

@@ -18,7 +18,7 @@ from masrel.lab.protocol import Protocol, StudyPaths
     "form",
     required=True,
     type=click.Choice(["bids", "ro-crate"]),
-    help="BIDS, or an RO-Crate.",
+    help="Standard of the data set: BIDS or RO-Crate.",
 )
 @click.option(
     "-o",
@@ -26,16 +26,16 @@ from masrel.lab.protocol import Protocol, StudyPaths
     "folder",
     required=True,
     type=click.Path(path_type=Path, file_okay=False),
-    help="Folder to make; it must not exist, or be empty.",
+    help="Folder to create; it must be new or empty.",
 )
 @click.option(
     "--include",
     multiple=True,
     metavar="NAME",
-    help="Export what is private, too: notes (on raters), logs, a field of raters or a "
-    "QUESTIONNAIRE.QUESTION that is not public. Repeatable.",
+    help="Also export something private: notes (on raters), logs, or a field of raters "
+    "or a QUESTIONNAIRE.QUESTION that is not public. Repeatable.",
 )
-@output_options(quiet="No progress bar.")
+@output_options(quiet="Show no progress bar.")
 def export(
     study: StudyPaths,
     protocol: Protocol,
@@ -44,10 +44,10 @@ def export(
     include: tuple[str, ...],
     output: OutputOptions,
 ) -> None:
-    """Write STUDY as a data set of a standard, to archive or share it.
+    """Write STUDY as a standard data set for archiving or sharing.
 
-    Ratings, raters and recordings are described once, with units and levels, and
-    written in the form asked for; the protocol goes along. The models are named.
+    Ratings, raters and recordings are described with units and levels and written in
+    the chosen form, together with the protocol. The data set names the models.
     """
     from masrel.lab.export import export_study
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     "predictors",
     default="L,H,Q,D,speed",
     show_default=True,
-    help="What grades are regressed on, in the order of their claim.",
+    help="Predictors of the grades; the first one is kept when some are redundant.",
 )
 @click.option(
     "--models",
@@ -34,10 +34,11 @@ if TYPE_CHECKING:
     default="all",
     show_default=True,
 )
-@click.option("--session", help="Ratings of this session alone.")
+@click.option("--session", help="Use only ratings of this session.")
 @click.option("--level", type=float, default=0.95, show_default=True)
 @output_options(
-    json="Write the result here; - prints it, and nothing else, on stdout.",
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else.",
 )
 def grading(
     study: Path,
@@ -50,8 +51,8 @@ def grading(
 ) -> None:
     """Regress the grades of STUDY on the models' L, H, Q, D and the speed.
 
-    Prints by how much one standard deviation of each multiplies the odds of a higher
-    grade, the others held.
+    Prints the factor by which one standard deviation of each predictor multiplies the
+    odds of a higher grade, with the others held constant.
     """
     from masrel.lab.analysis import grade_regression
     from masrel.lab.analysis._results import as_plain

@@ -15,11 +15,11 @@ from masrel.lab.protocol import copy_template
     default="small",
     show_default=True,
     metavar="NAME",
-    help="Bundled study to copy: small, a template to edit; tone, one of several "
-    "kinds of models; two-sites, with all that a coordinator needs; or hess2012.",
+    help="Bundled study to copy: small, a template to edit; tone, with several kinds "
+    "of models; two-sites, with everything a coordinator needs; or hess2012.",
 )
 def init(folder: Path, template: str) -> None:
-    """Make a new study in DIR, which must not exist or be empty."""
+    """Create a new study in DIR, which must be a new or empty folder."""
     copy_template(template, folder)
     click.echo(f"{folder}: a study made from {template}. Next:")
     click.echo(f"  edit {folder / 'protocol.toml'}")

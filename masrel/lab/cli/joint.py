@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
 
 _COMMANDS = {
-    "trace": "Phases, peak torque and samples of stretches of models.",
-    "tardieu": "R2, R1 and their difference, by stretches at three speeds.",
-    "fit": "Identify the joint behind recordings of slow and fast stretches.",
+    "trace": "Compute phases, peak torque and samples of stretches of models.",
+    "tardieu": "Compute R2, R1 and their difference from stretches at three speeds.",
+    "fit": "Estimate a joint's parameters from recordings of stretches.",
     "friction": "Fit the friction of a device to recordings of backdriving.",
-    "between": "Put models at even steps between neighbours, to hide standards.",
+    "between": "Create models to use as dummies between the standards.",
 }
 _MODULES = {"trace": "_trace", "fit": "_fit", "friction": "_fit"}
 
@@ -49,7 +49,7 @@ _MODULES = {"trace": "_trace", "fit": "_fit", "friction": "_fit"}
     place=lambda name: f"masrel.lab.cli.{_MODULES.get(name, 'joint')}",
 )
 def joint() -> None:
-    """Traces of joints, joints of recordings, and models between models."""
+    """Trace or fit joints, and create models between two others."""
 
 
 START_DEG = 30.0
@@ -100,8 +100,7 @@ joint_options = grouped(
     JointOptions,
     click.option(
         "--model", "models", multiple=True,
-        help="HM1 to HM4, a model of --study, or a model file (.toml); may be given "
-        "again.",
+        help="HM1 to HM4, a model of --study, or a model file (.toml). Repeatable.",
     ),
     click.option(
         "--study", type=click.Path(path_type=Path),
@@ -109,26 +108,33 @@ joint_options = grouped(
     ),
     click.option(
         "--kind", "kinds", multiple=True,
-        help="Another kind of joint with its defaults, as in a protocol; may be given "
-        "again.",
+        help="Another kind of joint with its defaults, named as in a protocol. "
+        "Repeatable.",
     ),
     click.option(
         "--parameter", "parameters", multiple=True, metavar="KEY=VALUE",
-        help="One of its numbers, as in [models.parameters]; may be given again.",
+        help="Parameter of --kind, named as in [models.parameters]. Repeatable.",
     ),
-    click.option("--rest-deg", "rest", type=float, help="θ_rest; default: the start."),
+    click.option(
+        "--rest-deg", "rest", type=float,
+        help="Resting angle, θ_rest; default: where the stretch starts.",
+    ),
     click.option(
         "--post-catch", type=click.Choice(["continuous", "additive"]),
-        help="How (5) is read.",
+        help="Reading of equation (5), the torque after the catch.",
     ),
     click.option(
         "--q-reading", "reading", type=click.Choice(["residual", "decrease"]),
-        help="What Q is a share of the peak for.",
+        help="What Q measures as a share of the peak.",
     ),
     click.option(
-        "--catch-rise-s", "rise", type=float, help="Smooth the catch's onset."
+        "--catch-rise-s", "rise", type=float,
+        help="Time over which the onset of the catch is smoothed.",
     ),
-    click.option("--inertia-kg-m2", "inertia", type=float, help="m of (1) and (5)."),
+    click.option(
+        "--inertia-kg-m2", "inertia", type=float,
+        help="Inertia, m in equations (1) and (5).",
+    ),
 )  # fmt: skip
 
 
@@ -138,16 +144,19 @@ joint_options = grouped(
 @click.option(
     "--speed-deg-s", "speeds", type=(float, float, float), metavar="V1 V2 V3",
     default=(10.0, 100.0, 150.0),
-    help="Speeds of the stretches.  [default: 10 100 150]",
+    help="Speeds of the three stretches.  [default: 10 100 150]",
 )  # fmt: skip
-@output_options(json="Write them as JSON here; - for the screen.")
+@output_options(
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else."
+)
 def tardieu(
     joints: JointOptions,
     start: float,
     speeds: tuple[float, float, float],
     output: OutputOptions,
 ) -> None:
-    """R2, R1 and their difference, by stretches to the end of range at three speeds."""
+    """Compute R2, R1 and their difference from full-range stretches at three speeds."""
     from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
 
     documents = [
@@ -170,7 +179,7 @@ def joints_of(names: JointOptions) -> dict[str, "JointModel"]:
     if not names.models and not names.kinds:
         raise click.UsageError("Missing option '--model' or '--kind'.")
     if names.parameters and len(names.kinds) != 1:
-        raise ParameterError("--parameter: goes with one --kind, whose it is")
+        raise ParameterError("--parameter: needs exactly one --kind")
     joints: dict[str, JointModel] = {}
     models, study = tuple(dict.fromkeys(names.models)), names.study
     more = ", or --study to name a study's own"
@@ -265,22 +274,23 @@ _RULE = (
     "n_models",
     type=int,
     required=True,
-    help="How many to make; the same number in every gap.",
+    help="Number of models to create; every gap gets the same number.",
 )
 @click.option(
     "-o",
     "--output",
     "folder",
     type=click.Path(path_type=Path),
-    help="Write a model file each into this folder: D01.toml, D02.toml, ...",
+    help="Write the models to this folder as D01.toml, D02.toml, ...",
 )
 @click.option(
     "--overwrite",
     is_flag=True,
-    help="Replace model files of these names that are there.",
+    help="Replace existing model files of the same names.",
 )
 @output_options(
-    json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else.",
     makes_folder=True,
 )
 def between(
@@ -290,14 +300,16 @@ def between(
     overwrite: bool,
     output: OutputOptions,
 ) -> None:
-    """Put models at even steps between neighbours: dummies that hide standards.
+    """Create intermediate models to use as dummies between the standards.
 
-    A MODEL is HM1, HM2, HM3, HM4 or a model file (.toml), mildest first: their order
-    says who is whose neighbour. Prints L, H, Q and D of each; a protocol names the
-    files.
+    A MODEL is HM1, HM2, HM3, HM4 or a model file (.toml). List them from mildest to
+    most severe: new models are put at even steps between neighbours. Prints L, H, Q and
+    D of each model. To use the new models, name their files in a protocol.
     """
     if overwrite and folder is None:
-        raise ParameterError("--overwrite: needs --output: nothing is written without")
+        raise ParameterError(
+            "--overwrite: needs --output, without which nothing is written"
+        )
     rows = _rows(models, n_models)
     if folder is not None:
         _write(rows, folder, overwrite=overwrite)
@@ -380,7 +392,7 @@ def _table(rows: list[dict[str, Any]]) -> "Table":
     quantities = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]
     return Table(
         name="between",
-        caption="Models between models",
+        caption="Intermediate models",
         columns=(
             Column(key="model", heading="Model", align="left"),
             Column(key="way", heading="Way", align="left"),

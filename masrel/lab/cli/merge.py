@@ -14,15 +14,15 @@ from masrel.lab.protocol import StudyPaths, read_protocol
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
     required=True,
-    help="Folder of the merged study; new or empty.",
+    help="Folder for the merged study; it must be new or empty.",
 )
 def merge(studies: tuple[Path, ...], output: Path) -> None:
-    """Put STUDIES, the folders of the sites of one study, together in a new folder.
+    """Combine STUDIES, the folders of the sites of one study, in a new folder.
 
-    Everything is verified before and after. Protocols may differ in their raters
-    alone, schedules are drawn from one secret, and no rater has sessions in two
-    folders. No secret is copied, and nothing that is made of the logs: ratings,
-    analysis and report are made anew, and so are sheets to print.
+    Everything is verified before and after. The protocols may differ only in their
+    raters, the schedules must come from one secret, and no rater may have sessions in
+    two folders. Secrets are not copied, nor is anything made from the logs: make
+    ratings, analysis, report and printable sheets again in the new folder.
     """
     from masrel.lab.merging import merge_studies
 

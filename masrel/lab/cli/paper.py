@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @click.group("paper", cls=Commands)
 def paper() -> None:
-    """Sheets of raters who grade on paper: to print, and to enter once filled in."""
+    """Print sheets for grading on paper, and enter completed sheets."""
 
 
 @paper.command("print")
@@ -39,11 +39,11 @@ def _print(
     sessions: tuple[str, ...],
     sites: tuple[str, ...],
 ) -> None:
-    """Make sheets of drawn schedules to print, and files to type them into.
+    """Make printable sheets of drawn schedules, and files to type them into.
 
-    The sheets are a page to open in a browser and print. They have codes and no models.
-    What was written on one is typed into its file, which masrel paper enter takes in; a
-    file in which something has been typed stays as it is.
+    The sheets are one page to open in a browser and print. They show codes but not
+    models. Type each completed sheet into its file, then run masrel paper enter. A file
+    that already has entries is not changed.
     """
     from masrel.lab.paper import write_sheets
 
@@ -52,7 +52,7 @@ def _print(
     note = f", {n_kept} of them filled in and kept" if n_kept else ""
     click.echo(
         f"{made.html}: {n_typed} {'sheet' if n_typed == 1 else 'sheets'} to print. "
-        f"Type each into its SESSION_RATER.csv beside it{note}; then: masrel paper "
+        f"Type each into its SESSION_RATER.csv beside it{note}. Next: masrel paper "
         "enter"
     )
 
@@ -62,7 +62,7 @@ _sheet_options = several(
     click.argument("file", type=InputFile(path_type=Path)),
     id_option,
     session_option,
-    click.option("--who", required=True, help="Who typed it."),
+    click.option("--who", required=True, help="Who typed in the sheet."),
 )
 
 
@@ -71,9 +71,9 @@ _sheet_options = several(
 @click.option(
     "--on",
     metavar="DATE",
-    help="Day of the session, as on the sheet.",
+    help="Date of the session, as on the sheet.",
 )
-@click.option("--device", help="What presented the models; default: none.")
+@click.option("--device", help="Device that presented the models; default: none.")
 def _enter(
     paths: "StudyPaths",
     protocol: "Protocol",
@@ -84,9 +84,9 @@ def _enter(
     on: str | None,
     device: str | None,
 ) -> None:
-    """Enter a sheet of STUDY that was filled in on paper and typed into FILE.
+    """Enter a completed paper sheet of STUDY that was typed into FILE.
 
-    All of it enters the session's log, or nothing where a row is wrong.
+    The whole sheet is added to the session's log; if any row is wrong, nothing is.
     """
     from masrel.lab.paper import enter_sheet
     from masrel.lab.run._state import NO_DEVICE
@@ -107,7 +107,7 @@ def _enter(
     without = f", {n_missing} missing," if n_missing else ""
     click.echo(
         f"session {session} of {rater} is entered: {n_graded} grades from paper"
-        f"{without} in {paths.log_file(rater, session)}. Then: masrel ratings"
+        f"{without} in {paths.log_file(rater, session)}. Next: masrel ratings"
     )
 
 
@@ -121,9 +121,10 @@ def _again(
     session: str,
     who: str,
 ) -> None:
-    """Compare FILE, a sheet that somebody else typed, with what was entered first.
+    """Compare FILE, a sheet typed by a second person, with the first entry.
 
-    Nothing is entered: where the two entries differ is listed, and the exit code is 1.
+    Nothing is entered. If the two entries differ, the differences are listed and the
+    exit code is 1.
     """
     from masrel.lab.paper import compare_sheet
 
@@ -132,10 +133,10 @@ def _again(
         click.echo(_in_words(each))
     if differences:
         click.echo(
-            "Look at the paper. Where the first entry is wrong: masrel record correct "
+            "Look at the paper. If the first entry is wrong: masrel record correct "
             "--code CODE --grade GRADE, or masrel record answer --question QUESTION "
-            "--answer ANSWER, --who WHO --why TEXT; where the second is: mend FILE and "
-            "compare it again"
+            "--answer ANSWER, --who WHO --why TEXT. If the second entry is wrong: "
+            "correct FILE and compare it again."
         )
         click.get_current_context().exit(1)
     click.echo(f"session {session} of {rater}: both entries agree")

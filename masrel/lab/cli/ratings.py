@@ -23,9 +23,9 @@ from masrel.lab.protocol import Protocol, StudyPaths
 def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
     """Collect the ratings of STUDY from its session logs.
 
-    Every chain of hashes is verified, and every recording that is there is held
-    against its checksum. Corrections take the place of the grades they correct. The
-    table of raters, raters.csv, is written beside STUDY/ratings/ratings.csv.
+    Every chain of hashes is verified, and every recording present is compared with its
+    checksum. Corrected grades replace the original ones. The table of raters,
+    raters.csv, is written beside STUDY/ratings/ratings.csv.
     """
     from masrel.lab.progress import raters_csv
     from masrel.lab.ratings import (
@@ -61,7 +61,10 @@ def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
         click.echo(f"{len(answers) - n_open} answers, {n_open} missing: {beside}")
     n_slow = sum(row.felt in ("below-threshold", "no-catch") for row in ratings.rows)
     if n_slow:
-        click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")
+        click.echo(
+            f"{n_slow} ratings followed stretches too slow to feel the catch: column "
+            "felt"
+        )
     n_lost = sum(row.grip_lost is True for row in ratings.rows)
     if n_lost:
-        click.echo(f"{n_lost} after a grip that was lost: column grip_lost")
+        click.echo(f"{n_lost} ratings followed a lost grip: column grip_lost")

@@ -25,24 +25,24 @@ if TYPE_CHECKING:
 
 @click.group("record", cls=Commands)
 def record() -> None:
-    """Record what happened to a study beside its presentations, and who says so.
+    """Record notes, events, corrections and changes of raters, and who reports them.
 
-    All of it is added to logs: what was recorded before stays there.
+    Everything is added to the logs; earlier entries are kept.
     """
 
 
-_who = click.option("--who", required=True, help="Who says so.")
-_why = click.option("--why", required=True, help="For what reason.")
+_who = click.option("--who", required=True, help="Who reports this.")
+_why = click.option("--why", required=True, help="The reason.")
 _code = click.option("--code", required=True, help="Code of the presentation.")
 _on = click.option(
-    "--on", metavar="DATE", help="The day it happened; today unless said."
+    "--on", metavar="DATE", help="Date on which it happened; default: today."
 )
 _about = several(
     of_study,
     click.argument("text"),
     _who,
-    click.option("--rater", help="To whom it happened."),
-    click.option("--session", help="In which session."),
+    click.option("--rater", help="The rater it concerns."),
+    click.option("--session", help="The session it concerns."),
     _on,
 )
 
@@ -63,31 +63,38 @@ def _add_note(kind: "NoteKind", text: str, *options: Decorator) -> None:
 
 _add_note(
     "note",
-    """Record TEXT in the log of STUDY, with the time of day.
+    """Record TEXT as a note in the log of STUDY, with the time.
 
-    masrel status shows it; the report shows what kind it is and when, and the text if
-    --include notes asks for it.
+    masrel status shows the note. The report shows its kind and time, and its text only
+    with --include notes.
     """,
 )
 _add_note(
-    "deviation", "Record TEXT, a deviation from the protocol, as a note is recorded."
+    "deviation",
+    "Record TEXT as a deviation from the protocol, in the same way as a note.",
 )
 _add_note(
     "adverse-event",
-    "Record TEXT, an adverse event, as a note is recorded.",
-    click.option("--severity", metavar="mild|moderate|severe"),
+    "Record TEXT as an adverse event, in the same way as a note.",
     click.option(
-        "--seriousness", metavar="'serious'|'not serious'", help="As ICH E2A means it."
+        "--severity",
+        metavar="mild|moderate|severe",
+        help="Severity of the adverse event.",
+    ),
+    click.option(
+        "--seriousness",
+        metavar="'serious'|'not serious'",
+        help="Whether the event is serious as defined by ICH E2A.",
     ),
     click.option(
         "--relatedness",
         metavar="WORD",
-        help="Whether the study caused it: unrelated, unlikely, possible, probable or "
-        "definite.",
+        help="Whether the study caused the event: unrelated, unlikely, possible, "
+        "probable or definite.",
     ),
-    click.option("--onset", metavar="DATE", help="The day it began."),
-    click.option("--action", help="What was done about it."),
-    click.option("--outcome", help="What came of it."),
+    click.option("--onset", metavar="DATE", help="Date on which the event began."),
+    click.option("--action", help="Action taken."),
+    click.option("--outcome", help="Outcome of the event."),
 )
 
 
@@ -99,7 +106,7 @@ def _or_missing(text: str) -> str | None:
 @_of_session(
     _code,
     click.option(
-        "--grade", required=True, help="What it should have been, NA for missing."
+        "--grade", required=True, help="The correct grade, or NA for missing."
     ),
 )
 def _correct(
@@ -111,7 +118,7 @@ def _correct(
     code: str,
     **reasons: Any,
 ) -> None:
-    """Correct the grade of a presentation of STUDY; the first one stays in the log."""
+    """Correct the grade of a presentation; the original grade stays in the log."""
     from masrel.lab.run import record_correction
 
     record_correction(
@@ -123,7 +130,12 @@ def _correct(
 
 @record.command("day")
 @_of_session(
-    click.option("--on", metavar="DATE", required=True, help="The day it was held.")
+    click.option(
+        "--on",
+        metavar="DATE",
+        required=True,
+        help="Date on which the session was held.",
+    )
 )
 def _day(
     study: "StudyPaths",
@@ -132,16 +144,16 @@ def _day(
     session: str,
     **fields: Any,
 ) -> None:
-    """Correct the day of a session of STUDY; the first one stays in the log.
+    """Correct the date of a session; the original date stays in the log.
 
-    The days between sessions are counted anew.
+    The days between sessions are recalculated.
     """
     from masrel.lab.run import record_day
 
     with warnings_as_notes():
         record_day(study, protocol, rater, session, **fields)
     click.echo(
-        f"session {session} of {rater} was held on {fields['on']}, as is said in "
+        f"session {session} of {rater} was held on {fields['on']}; recorded in "
         f"{study.log_file(rater, session)}"
     )
 
@@ -156,26 +168,28 @@ def _skip(
     code: str,
     **reasons: Any,
 ) -> None:
-    """Leave a presentation of STUDY, after a fault, without a grade."""
+    """Leave a presentation without a grade after a fault."""
     from masrel.lab.run import record_skip
 
     record_skip(study, protocol, rater, session, code=code, **reasons)
     log = study.log_file(rater, session)
     click.echo(
-        f"{code} of {rater}, session {session}, is skipped, as is said in {log}. "
-        "Then: masrel ratings"
+        f"{code} of {rater}, session {session}, is skipped; recorded in {log}. "
+        "Next: masrel ratings"
     )
 
 
 @record.command("answer")
 @_of_session(
     click.option(
-        "--question", required=True, help="Which, named as QUESTIONNAIRE.QUESTION."
+        "--question", required=True, help="The question, as QUESTIONNAIRE.QUESTION."
     ),
     click.option(
-        "--answer", required=True, help="What it should have been, NA for missing."
+        "--answer", required=True, help="The correct answer, or NA for missing."
     ),
-    click.option("--code", help="Of which presentation."),
+    click.option(
+        "--code", help="Code of the presentation that the question was about."
+    ),
 )
 def _answer(
     study: "StudyPaths",
@@ -185,7 +199,7 @@ def _answer(
     answer: str,
     **fields: Any,
 ) -> None:
-    """Correct an answer to a question of STUDY; the first one stays in the log."""
+    """Correct an answer to a question; the original answer stays in the log."""
     from masrel.lab.run import record_answer
 
     log = record_answer(
@@ -198,14 +212,14 @@ def _answer(
 
 def _say_corrected(what: str, now: str | None, log: Path) -> None:
     click.echo(
-        f"{what} is now {now or 'missing'}; what it was before stays in {log}. Then: "
+        f"{what} is now {now or 'missing'}; the original stays in {log}. Next: "
         "masrel ratings"
     )
 
 
 @record.group("rater", cls=Commands)
 def _rater() -> None:
-    """Record what is known of a rater, or take another one in.
+    """Record information about a rater, or add a rater.
 
     masrel record rater STUDY records fields of a rater.
     """
@@ -225,8 +239,8 @@ def _set(
 ) -> None:
     """Record fields of a rater of STUDY, such as years=12.
 
-    The protocol declares the fields in [rater_fields]. What is recorded last counts,
-    what was recorded before stays in the log; FIELD= alone says that nothing is known.
+    The protocol declares the fields in [rater_fields]. The latest value counts; earlier
+    values stay in the log. FIELD= alone records that the value is unknown.
     """
     from masrel.lab.conduct import record_rater_values
 
@@ -239,9 +253,13 @@ def _set(
 @of_study
 @id_option
 @click.option(
-    "--session", "sessions", multiple=True, required=True, help="In which; repeatable."
+    "--session",
+    "sessions",
+    multiple=True,
+    required=True,
+    help="Session of the rater. Repeatable.",
 )
-@click.option("--site", help="Where the rater is.")
+@click.option("--site", help="Site of the rater.")
 @click.argument("values", metavar="[FIELD=VALUE]...", nargs=-1)
 @_who
 def _add(
@@ -252,9 +270,9 @@ def _add(
     values: tuple[str, ...],
     **fields: Any,
 ) -> None:
-    """Take another rater into STUDY: into its protocol, whose comments stay.
+    """Add a rater to the protocol of STUDY, whose comments are kept.
 
-    Schedules that are drawn stay as they are.
+    Schedules that have been drawn are not changed.
     """
     from masrel.lab.conduct import record_new_rater
 
@@ -281,10 +299,10 @@ def _by_field(values: tuple[str, ...]) -> dict[str, str]:
 @_who
 @_why
 def _amend(study: "StudyPaths", protocol: "Protocol", who: str, why: str) -> None:
-    """Record that the plan of STUDY was changed since its first schedules were drawn.
+    """Record that the plan of STUDY was changed after its first schedules were drawn.
 
-    Edit the protocol first: a copy of it goes into the log. What has changed, and when,
-    is named by every command that reads the study, and in its report.
+    Edit the protocol first; a copy of it is added to the log. Every command that reads
+    the study, and its report, will then state what changed and when.
     """
     from masrel.lab.conduct import record_amendment
 
@@ -300,16 +318,16 @@ def _amend(study: "StudyPaths", protocol: "Protocol", who: str, why: str) -> Non
     "--output",
     type=click.Path(path_type=Path, dir_okay=False),
     required=True,
-    help="The file, for a registry.",
+    help="File to write, for a registry.",
 )
 @stamp_option
 def _register(
     study: "StudyPaths", protocol: "Protocol", output: Path, stamp: str | None
 ) -> None:
-    """Write what a registry keeps of STUDY: its plan, and a commitment to its orders.
+    """Write a file for a registry: the plan of STUDY and a commitment to its orders.
 
-    The protocol with its hash, and the hash of the secret that orders are drawn from,
-    which says nothing of them.
+    The file has the protocol with its hash, and the hash of the secret that the orders
+    are drawn from, which reveals nothing about them.
     """
     from masrel.cli._options import write_json
     from masrel.lab.conduct import registration
@@ -336,21 +354,21 @@ def _add_standing(
 
 _add_standing(
     *("exclude", "excluded", "is excluded; the grades are kept"),
-    """Leave a rater out of the analysis of STUDY; the grades stay in the study.
+    """Exclude a rater from the analysis of STUDY; the grades are kept.
 
-    Every command that computes says so, and so does the report.
+    Every command that computes results states the exclusion, and so does the report.
     """,
 )
 _add_standing(
     *("include", "included", "is analysed again"),
-    "Take a rater of STUDY who was excluded back into the analysis.",
+    "Include an excluded rater of STUDY in the analysis again.",
 )
 _add_standing(
     *("withdraw", "withdrawn", "is withdrawn; the grades given before are kept"),
     """Record that a rater has left STUDY.
 
-    The rater stays in the protocol, the grades given before stay in the study and are
-    counted, and the report says so. No session of the rater goes on.
+    The rater stays in the protocol. Grades given so far are kept and analysed, and the
+    report says so. The rater's sessions cannot be resumed.
     """,
     _on,
 )
@@ -359,10 +377,12 @@ _add_standing(
 @record.command("unblind")
 @of_study
 @click.argument("code", required=False)
-@click.option("--all", "every", is_flag=True, help="All codes of all schedules.")
-@click.option("--rater", help="Of this rater alone.")
-@click.option("--session", help="Of this session alone.")
-@click.option("--who", required=True, help="Who is to know.")
+@click.option(
+    "--all", "every", is_flag=True, help="Unblind all codes of all schedules."
+)
+@click.option("--rater", help="Only codes of this rater.")
+@click.option("--session", help="Only codes of this session.")
+@click.option("--who", required=True, help="Who is being unblinded.")
 @_why
 def _unblind(
     study: "StudyPaths",
@@ -371,10 +391,10 @@ def _unblind(
     every: bool,
     **fields: Any,
 ) -> None:
-    """Print which model CODE of STUDY stands for, once it is recorded who asked.
+    """Print which model has CODE, after recording who is unblinded and why.
 
-    It is an event of STUDY/conduct.jsonl, and the report says so. A sealed study is
-    opened by --all, once every session is over.
+    This becomes an event in STUDY/conduct.jsonl, and the report states it. --all opens
+    a sealed study once every session is over.
     """
     from masrel.lab.conduct import record_unblinding
     from masrel.lab.protocol.study import _OPENED

@@ -133,20 +133,20 @@ _compare_options = grouped(
         "--against",
         type=click.Path(path_type=Path),
         metavar="OLD",
-        help="Say, number by number, what has changed since an older report: its "
-        "folder, a study, or an analysis.json.",
+        help="List every number that has changed since an older report: its folder, a "
+        "study, or an analysis.json.",
     ),
     click.option(
         "--no-change",
         is_flag=True,
-        help="With --against: exit with 1 if a number has changed.",
+        help="With --against: exit with 1 if any number has changed.",
     ),
     click.option(
         "--exact",
         is_flag=True,
-        help="With --against: to the last digit. Otherwise numbers that differ by no "
-        "more than 1e-9 of their size, or 1e-12, are the same: so much is rounding, "
-        "which other processors and libraries do in another way.",
+        help="With --against: compare to the last digit. Otherwise numbers that differ "
+        "by at most 1e-9 of their size, or by 1e-12, count as equal, because "
+        "processors and libraries round differently.",
     ),
 )
 
@@ -165,43 +165,44 @@ _compare_options = grouped(
     "--only",
     multiple=True,
     metavar="SECTION",
-    help="Make a report of this section alone, in place of the one in the folder: its "
-    "text, tables and figures, and no others. Repeatable.",
+    help="Report only this section: its text, tables and figures. This replaces the "
+    "report in the folder. Repeatable.",
 )
 @click.option(
     "--format",
     "formats",
     multiple=True,
     type=click.Choice(FORMATS),
-    help="Write this format, too, beside those of the protocol; latex and docx need "
-    "pandoc, which the extra masrel[docx] brings. Repeatable.",
+    help="Also write this format, in addition to those of the protocol. latex and docx "
+    "need pandoc, which the extra masrel[docx] installs. Repeatable.",
 )
 @click.option(
     "--check",
     is_flag=True,
-    help="Write nothing; name the files that would change, and exit with 1 if there "
-    "are some.",
+    help="Write nothing; list the files that would change, and exit with 1 if there "
+    "are any.",
 )
 @gate_options()
 @click.option(
     "--include",
     multiple=True,
     metavar="NAME",
-    help="Show what is private, too: who (recorded events), notes (their texts), or a "
-    "field of raters that is not public. Repeatable.",
+    help="Also show something private: who (recorded each event), notes (their texts), "
+    "or a field of raters that is not public. Repeatable.",
 )
 @click.option(
     "--cache",
     "cache_folder",
     type=click.Path(path_type=Path, file_okay=False),
-    help=f"Folder that has what the last report was made from; default: STUDY/{NOTES}.",
+    help=f"Folder that keeps the inputs of the last report; default: STUDY/{NOTES}.",
 )
 @_compare_options
 @output_options(
-    json="Write here what came of gates, --check and --against; - prints it, and "
-    "nothing else, on stdout.",
-    raw_csv="No apostrophe before a text that a spreadsheet would run.",
-    quiet="No progress bar.",
+    json='Write the results of gates, --check and --against as JSON to this file; "-" '
+    "writes them to standard output and prints nothing else.",
+    raw_csv="Do not put an apostrophe before cells that a spreadsheet would run as "
+    "formulas.",
+    quiet="Show no progress bar.",
     makes_folder=True,
 )
 def report(
@@ -219,8 +220,8 @@ def report(
 ) -> None:
     """Write the report of STUDY: HTML, Markdown, tables and figures.
 
-    The analysis is computed from the protocol's plan; the same inputs give the
-    same bytes. Where nothing has changed since the last report, nothing is written.
+    The analysis follows the plan in the protocol; the same inputs give the same bytes.
+    If nothing has changed since the last report, nothing is written.
     """
     folder, notes = destination or study / "report", cache_folder or study / NOTES
     for option, place in ((destination, folder), (cache_folder, notes)):

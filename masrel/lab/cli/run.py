@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 @session_option
 @grades_option(
     *("console", "paper", "simulated"),
-    words="Who gives the grades; with paper models are presented by their codes, and a "
-    "sheet is entered afterwards.",
+    words="Source of the grades. With paper, models are presented by their codes and a "
+    "completed sheet is entered afterwards.",
 )
 @clock_option
-@output_options(quiet="No progress bar and no closing line.")
+@output_options(quiet="Show neither a progress bar nor a closing line.")
 @click.option(
     "--rehearse",
     is_flag=True,
-    help="Only rehearse: nothing of it enters the ratings of STUDY.",
+    help="Rehearse only; no grade becomes a rating of STUDY.",
 )
 def run(
     paths: StudyPaths,
@@ -47,10 +47,10 @@ def run(
     output: OutputOptions,
     rehearse: bool,
 ) -> None:
-    """Run one rater's session of STUDY, or go on with it where it stopped.
+    """Run a session for one rater, or resume it where it stopped.
 
-    The rater is shown blinded codes only. With --rehearse the order and the codes are
-    other ones, and log and recordings are kept in STUDY/rehearsals.
+    The rater sees only blinded codes. A rehearsal (--rehearse) has a different order
+    and different codes; its log and recordings are kept in STUDY/rehearsals.
     """
     from masrel.lab.run import SimulatedGrades, run_session
 
@@ -58,7 +58,7 @@ def run(
     # A person's prompts count the presentations themselves.
     hidden = output.quiet or grades != "simulated"
     if rehearse and not output.quiet:
-        click.echo("REHEARSAL: nothing of it enters the ratings of the study", err=True)
+        click.echo("REHEARSAL: no grade becomes a rating of the study", err=True)
     with (
         warnings_as_notes(),
         tqdm(total=n_presentations, unit="", desc=rater, disable=hidden or None) as bar,
@@ -75,8 +75,8 @@ def run(
     if not output.quiet and grades == "paper":
         typed = paths.typed_file(rater, session)
         click.echo(
-            f"session {session} of {rater} is presented. Next: masrel paper enter "
-            f"{paths.root} {typed if typed.exists() else 'FILE'} --rater {rater} "
+            f"session {session} of {rater} has been presented. Next: masrel paper "
+            f"enter {paths.root} {typed if typed.exists() else 'FILE'} --rater {rater} "
             f"--session {session} --who WHO"
         )
     elif not output.quiet:
@@ -94,7 +94,7 @@ def _completed(done: "SessionSummary", grades: str) -> str:
         f"{done.n_graded} grades{label}{without} in {done.log_file}"
     )
     if done.rehearsal:
-        text += "; none is a rating of the study"
+        text += "; none of them is a rating of the study"
     if done.n_set_aside:
-        text += f"; {done.n_set_aside} from before count no more"
+        text += f"; {done.n_set_aside} earlier grades no longer count"
     return text

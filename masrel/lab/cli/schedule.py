@@ -12,25 +12,26 @@ from masrel.lab.protocol import Protocol, StudyPaths
 
 @click.group("schedule", cls=Commands)
 def schedule() -> None:
-    """Draw the schedules of a study, once; show how even they are; copy for a site.
+    """Draw the schedules of a study, show their balance, or copy a study for a site.
 
-    masrel schedule STUDY draws.
+    masrel schedule STUDY draws them.
     """
 
 
 @schedule.command("show")
 @of_study
-@click.option("--site", help="Of the raters of this site alone.")
+@click.option("--site", help="Only raters of this site.")
 @output_options(
-    json="Write every count as JSON here; - prints it, and nothing else.",
-    figure="Heatmaps as .png, .svg or .pdf.",
+    json='Write every count as JSON to this file; "-" writes it to standard output and '
+    "prints nothing else.",
+    figure="Save heatmaps as .png, .svg or .pdf.",
 )
 def _show(
     paths: StudyPaths, protocol: Protocol, site: str | None, output: OutputOptions
 ) -> None:
-    """Print how even the drawn orders of STUDY are. Not for raters.
+    """Print how balanced the drawn orders of STUDY are. Not for raters.
 
-    Places by model, what follows what, runs.
+    Shows the positions of each model, which model follows which, and runs.
     """
     from masrel.lab.report._material import FIGURES
     from masrel.lab.report._order_tables import (
@@ -62,10 +63,10 @@ def _show(
     "destination",
     type=click.Path(path_type=Path),
     required=True,
-    help="Folder of the copy.",
+    help="Folder for the copy.",
 )
 def _copy(paths: StudyPaths, protocol: Protocol, site: str, destination: Path) -> None:
-    """Copy STUDY for a site, with the site's secret alone."""
+    """Copy STUDY for a site, with only that site's secret."""
     from masrel.lab.schedule import copy_for_site
 
     copy_for_site(protocol, paths, site, destination)
@@ -77,18 +78,17 @@ def _copy(paths: StudyPaths, protocol: Protocol, site: str, destination: Path) -
 @click.option(
     "--redraw",
     is_flag=True,
-    help="Draw schedules anew that no longer fit the protocol.",
+    help="Redraw schedules that no longer match the protocol.",
 )
-@click.option("--site", help="Of the raters of this site alone.")
+@click.option("--site", help="Only raters of this site.")
 def _draw(
     paths: StudyPaths, protocol: Protocol, redraw: bool, site: str | None
 ) -> None:
     """Draw each rater's schedule and blinded sheet for every session of STUDY.
 
-    Schedules are drawn once: those that are there stay as they are. When the
-    protocol has changed in what it presents, they are refused; --redraw draws them
-    anew, but never those of a session that has begun. In a copy that was made for a
-    site, they are those of its raters.
+    Schedules are drawn once, and existing schedules are kept. If the protocol has
+    changed in what it presents, they are refused; --redraw draws them again, except
+    those of sessions that have begun. A site's copy has the schedules of its raters.
     """
     from masrel.lab.conduct import allot_schedules
     from masrel.lab.schedule import site_of_copy

@@ -27,32 +27,32 @@ _LIBRARIES = ("starlette", "uvicorn", "segno")
     type=click.IntRange(0, 65_535),
     default=PORT,
     show_default=True,
-    help="Port of the pages; 0 takes any free one.",
+    help="Port of the pages; 0 uses any free port.",
 )
 @click.option(
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Address or name of this computer under which a tablet calls it; 0.0.0.0 for "
-    "all that it has.",
+    help="Address or name at which a tablet reaches this computer; 0.0.0.0 means all "
+    "of its addresses.",
 )
 @click.option(
     "--tls",
     nargs=2,
     type=click.Path(path_type=Path),
     metavar="CERT KEY",
-    help="Encrypt, with this certificate and its key, two PEM files.",
+    help="Encrypt with this certificate and its key, two PEM files.",
 )
 def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> None:
-    """Show STUDY in browsers: a rater's page and a coordinator's.
+    """Show STUDY in a browser: a page for the rater and one for the coordinator.
 
-    Two addresses are printed, each of which lets in one browser, once; Enter prints new
-    ones. A session by the browser leaves the same log as one by masrel run. Ctrl-C
-    stops what runs and then the server; a second one does not wait.
+    Two one-time addresses are printed. Press Enter for new ones. A session in the
+    browser leaves the same log as one of masrel run. Ctrl-C stops a running session and
+    then the server; a second Ctrl-C does not wait.
     """
     if sys.platform == "win32":  # a session takes over a socket of the server
         raise ParameterError(
-            "serve: needs Linux or macOS, got Windows; there is masrel run"
+            "serve: needs Linux or macOS, got Windows; use masrel run instead"
         )
     for name in _LIBRARIES:
         if importlib.util.find_spec(name) is None:
@@ -75,7 +75,7 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
         access = Access(paths, origin=origin, hosts=frozenset(names), say=click.echo)
         if tls is None and not _server.is_loopback(listener.getsockname()[0]):
             click.echo(
-                f"masrel: --host {host} without --tls: whoever is in this network can "
+                f"masrel: --host {host} without --tls: anybody in this network can "
                 "read the grades, and act as the rater or the coordinator",
                 err=True,
             )

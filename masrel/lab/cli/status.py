@@ -17,21 +17,24 @@ if TYPE_CHECKING:
 
 @click.group("status", cls=Commands)
 def status() -> None:
-    """Say how far a study is, or what is known of its raters.
+    """Show the progress of a study, or what is known about its raters.
 
-    masrel status STUDY says how far it is.
+    masrel status STUDY shows the progress.
     """
 
 
 @status.command(STUDY)
 @read_once()
 @of_study
-@output_options(json="Write it as JSON here; - prints it, and nothing else.")
+@output_options(
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else."
+)
 def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> None:
-    """Say how far STUDY is: every session, what happened beside them, one next step.
+    """Show the progress of STUDY: each session, other events, and the next step.
 
-    By the logs alone, whose chains are verified; no recording is read, nothing is
-    changed, and no model is named.
+    Only the logs are read, and their hash chains are verified. Nothing is changed, and
+    no model is named.
     """
     from masrel.lab.conduct import PlanChange
     from masrel.lab.progress import study_status
@@ -145,11 +148,12 @@ def _minute(time_utc: str) -> str:
 @read_once()
 @of_study
 @output_options(
-    json="Write the list here; - prints it, and nothing else.",
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else.",
     csv="Print the list as CSV.",
 )
 def _raters(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> None:
-    """List the raters of STUDY: how far each came, and what is known of him or her."""
+    """List the raters of STUDY, their progress, and what is known about them."""
     from masrel.lab.progress import rater_progress, session_progress
 
     sessions = session_progress(paths, protocol)

@@ -27,18 +27,18 @@ _WIDTH = 88  # of notes below a table
 
 @click.group("train", cls=Commands)
 def train() -> None:
-    """Train a rater on models of known grade, or show how far a training is.
+    """Train a rater on models of known grade, or show the progress of a training.
 
-    masrel train STUDY --rater R1 trains.
+    masrel train STUDY --rater R1 starts the training, or resumes it.
     """
 
 
 @train.command(STUDY)
 @of_study
 @id_option
-@grades_option("console", "simulated", words="Who gives the grades.")
+@grades_option("console", "simulated", words="Source of the grades.")
 @clock_option
-@output_options(quiet="No closing line.")
+@output_options(quiet="Do not print the closing line.")
 def _train(
     paths: "StudyPaths",
     protocol: "Protocol",
@@ -47,12 +47,11 @@ def _train(
     clock: Literal["real", "simulated"] | None,
     output: OutputOptions,
 ) -> None:
-    """Train one rater of STUDY, or go on with the training where it stopped.
+    """Train one rater of STUDY, or resume the training where it stopped.
 
-    Models whose grade is known are presented, and the rater is shown the right grade
-    after each; the training is passed once kappa with these grades is high enough, by
-    the test that [training] of the protocol sets. Nothing of a training enters the
-    ratings of the study.
+    The rater grades models of known grade and is shown the right grade after each one.
+    The training is passed once kappa with these grades is high enough, by the test that
+    [training] of the protocol sets. No grade of a training becomes a rating of STUDY.
     """
     from masrel.lab.report._training import NOT_RATINGS, outcome
     from masrel.lab.training import SimulatedTrainee, train_rater
@@ -88,12 +87,13 @@ def _show_grade(lesson: "Lesson") -> None:
     "--html",
     "page",
     type=OutputFile(path_type=Path, dir_okay=False),
-    help="Write a page with the curve and the tables here.",
+    help="Write a page with the learning curve and the tables to this file.",
 )
 @output_options(
-    json="Write it here; - prints it, and nothing else, on stdout.",
-    figure="Draw the learning curve, as .png, .svg or .pdf.",
-    csv="The learning curve as CSV, every digit kept.",
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else.",
+    figure="Save the learning curve as .png, .svg or .pdf.",
+    csv="Print the learning curve as CSV with all digits.",
 )
 def _show(
     paths: "StudyPaths",
@@ -103,7 +103,7 @@ def _show(
     page: Path | None,
     output: OutputOptions,
 ) -> None:
-    """Show the training of one rater of STUDY so far; nothing is presented."""
+    """Show the training of one rater of STUDY so far, without presenting a model."""
     from masrel.lab.report._training import (
         learning_content,
         training_document,

@@ -32,16 +32,19 @@ if TYPE_CHECKING:
     "--anchor",
     "anchor_file",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="File of hashes outside the study: made when it is not there, and else what "
-    "the logs are held against.",
+    help="File of hashes kept outside the study. The logs are compared with it; if it "
+    "does not exist, it is created.",
 )
 @stamp_option
 @click.option(
     "--authority",
     type=InputFile(path_type=Path),
-    help="Certificate, PEM, of who stamped the file of hashes.",
+    help="Certificate (PEM) of the service that stamped the file of hashes.",
 )
-@output_options(json="Write everything here as JSON; - prints it, and nothing else.")
+@output_options(
+    json='Write JSON to this file; "-" writes it to standard output and prints nothing '
+    "else."
+)
 @read_once()
 def verify(
     study: Path,
@@ -50,18 +53,18 @@ def verify(
     authority: Path | None,
     output: OutputOptions,
 ) -> None:
-    """Verify the record of STUDY, every file against the one it was made from.
+    """Check every file of STUDY against the file it was made from.
 
     Protocol, schedules, logs and recordings of sessions, trainings and rehearsals,
-    tables, analysis and report. Prints how far each came, what is wrong, and an
-    anchor for each log: a hash that, kept elsewhere, shows that its lines were not
-    written anew.
+    tables, analysis and report are checked. Prints the progress of each session, what
+    is wrong, and an anchor for each log: a hash that, if kept elsewhere, shows that its
+    lines were not rewritten.
 
-    A finding is broken, stale or a doubt. Broken is what no state of the record can
-    have been or made: exit code 2. Stale is what was made of an earlier state of the
-    record, or of something that no log keeps; the command that makes it anew is named:
-    exit code 1, where nothing is broken. A doubt may have an innocent reason: exit
-    code 0, as without findings.
+    A finding is broken, stale or a doubt. Broken: no state of the record could look
+    like this or produce this; the exit code is 2. Stale: the file was made from an
+    earlier state of the record, or from something that no log keeps, and the command
+    that makes it again is named; the exit code is 1 if nothing is broken. Doubt: there
+    may be an innocent reason; the exit code is 0, as without findings.
     """
     from masrel.lab.verification import anchors_of, verify_study
 
@@ -92,8 +95,8 @@ def _anchored(
         return ()
     if file.resolve().is_relative_to(study.root.resolve()):
         raise ParameterError(
-            f"--anchor: needed a file outside {study.root}, got {file}: who can change "
-            "the study can change it too"
+            f"--anchor: needed a file outside {study.root}, got {file}: anybody "
+            "who can change the study could change it too"
         )
     if file.exists():
         old = read_anchors(file)
@@ -102,8 +105,8 @@ def _anchored(
         if newer:
             click.echo(
                 f"note: {newer} of {len(anchors)} logs have lines that no anchor in "
-                f"{file} covers yet; --anchor with another file keeps anchors of them "
-                "too",
+                f"{file} covers yet; to keep anchors of them too, name "
+                "another file with --anchor",
                 err=True,
             )
         return anchor_findings(study, old)
@@ -111,7 +114,9 @@ def _anchored(
         write_anchors(anchors, file)
         click.echo(f"anchors: {file}", err=True)
     else:
-        click.echo(f"no log to anchor yet: {file} is not written", err=True)
+        click.echo(
+            f"there is no log to anchor yet, so {file} was not written", err=True
+        )
     return ()
 
 

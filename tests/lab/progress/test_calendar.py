@@ -98,7 +98,7 @@ def test_a_retest_is_due_in_its_days_and_next_only_then(
         with pytest.raises(ParameterError, match="days after session test"):
             run(study, protocol, "R1", "retest", days)
     if verb == "ratings":
-        assert step.why.startswith("1 of 3 sessions cannot begin any more")
+        assert step.why.startswith("1 of 3 sessions can no longer begin")
     assert due.not_today is None or str(days) in due.not_today
 
 

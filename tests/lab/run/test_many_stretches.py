@@ -146,7 +146,7 @@ def test_what_was_too_slow_is_said_to_the_rater_counted_and_graded_all_the_same(
     assert ratings_from_logs(*small).table["felt"].tolist() == ["below-threshold"] * 3
     page = small[0].root / "report" / "report.md"
     for words, text in (
-        (["ratings"], "3 after stretches too slow to feel the catch"),
+        (["ratings"], "3 ratings followed stretches too slow to feel the catch"),
         (["analyze"], "In 3 of 3 presentations the stretches were too slow"),
         (["report", "--quiet"], "none reached ν\\_th in 3, and none came to the catch"),
     ):
@@ -181,7 +181,7 @@ def test_a_grip_that_was_lost_stands_in_the_table_and_the_report(
     assert [row.grip_lost for row in ratings.rows] == lost
     root = small[0].root
     called = CliRunner().invoke(cli, ["ratings", str(root)]).output
-    assert f"{sum(lost)} after a grip that was lost: column grip_lost" in called
+    assert f"{sum(lost)} ratings followed a lost grip: column grip_lost" in called
     table = small[0].ratings_file.read_text(encoding="utf-8").splitlines()
     assert sum(line.endswith(",yes") for line in table) == sum(lost)
     CliRunner().invoke(cli, ["report", str(root), "--quiet"])
@@ -297,8 +297,8 @@ def test_nothing_of_a_rehearsal_is_a_rating(new_study: New, tmp_path: Path) -> N
     other[0].root.mkdir()  # it draws a secret of its own
     call = ["run", str(study.root), "--rater", "R1", "--session", "test", "--rehearse"]
     done = CliRunner().invoke(cli, [*call, "--grades", "simulated"])
-    assert "REHEARSAL: nothing of it enters the ratings" in done.output
-    assert "none is a rating of the study" in done.output
+    assert "REHEARSAL: no grade becomes a rating" in done.output
+    assert "none of them is a rating of the study" in done.output
     log, codes = rehearsed(small)
     assert log == study.root / "rehearsals" / "2" / "rehearsal_test_R1.jsonl"
     assert read_log(log)[0].fields["rehearsal"] is True

@@ -308,7 +308,7 @@ def test_what_cannot_be_served_is_said(
     monkeypatch.undo()
     monkeypatch.setattr(sys, "platform", "win32")
     done = masrel("serve", study)
-    why = "serve: needs Linux or macOS, got Windows; there is masrel run"
+    why = "serve: needs Linux or macOS, got Windows; use masrel run instead"
     assert (done.code, done.out, done.err) == (2, "", f"masrel: {why}\n")
 
 
