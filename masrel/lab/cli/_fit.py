@@ -194,7 +194,9 @@ def friction(
     "fitted",
 )
 @_term("--drift", "Drift of the offset, N·m/s; fitted for each trial.")
-@_term("--lag", "Time constant of the torque sensor, s.")
+@_term(
+    "--lag", "Time constant of the torque sensor, s; below 0 the angle is late by it."
+)
 @_term("--rise", "Time that a catch takes to reach its peak, s.")
 @click.option(
     "--compare",

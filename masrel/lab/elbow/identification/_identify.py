@@ -220,7 +220,8 @@ def fit(
     drift : float or {"off", "fitted"}, optional
         What the offset gains in a second, N·m/s; fitted for each trial.
     lag : float or {"off", "fitted"}, optional
-        Time constant of a torque sensor of first order, s.
+        Time constant of a torque sensor of first order, s; below 0, to -0.05, by how
+        much it is the angle that is late instead, as after another filter.
     rise : float or {"off", "fitted"}, optional
         How long the torque of a catch takes to its peak, s: `catch_rise`.
     slow_below : float, optional
@@ -274,7 +275,9 @@ def fit(
         level=level,
     )
     movements = [
-        entry if isinstance(entry, Movement) else read_movement(Path(entry))
+        _aligned(
+            entry if isinstance(entry, Movement) else read_movement(Path(entry)), lag
+        )
         for entry in recordings
     ]
     models = sorted({m.model for m in movements if m.model is not None})
@@ -309,6 +312,14 @@ def fit(
             SmallSampleWarning,
         )
     return result
+
+
+def _aligned(movement: Movement, lag: Term) -> Movement:
+    # the torque as late as the angle beside it is, by a negative lag
+    if isinstance(lag, str) or lag >= 0.0:
+        return movement
+    time = movement.time
+    return replace(movement, torque=np.interp(time + lag, time, movement.torque))
 
 
 def _stretches(

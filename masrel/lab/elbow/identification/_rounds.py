@@ -40,6 +40,7 @@ Term = float | Literal["off", "fitted"]
 ALWAYS = ("damping", "stiffness", "inertia")
 
 # Of what takes time: where the search for it begins, s.
+_LATEST_S = 0.05  # that an angle may be beside its torque
 _STARTS = {"lag": (0.004, 0.016), "catch_rise": (0.01, 0.04, 0.08)}
 
 # In periods of samples: none is told from nothing that is shorter. The search may go
@@ -111,6 +112,7 @@ class FitOptions:
             name: 0.0 if isinstance(term, str) else float(term)
             for name, term in self.terms.items()
         }
+        held["lag"] = max(held["lag"], 0.0)  # below, the recordings are put right
         return Law(
             constants=self.constants,
             fitted=self.fitted,
@@ -126,12 +128,13 @@ def _rules(name: str, term: object, longest: float) -> list[tuple[bool, str]]:
     is_number = isinstance(term, int | float) and math.isfinite(term)
     value = float(term) if isinstance(term, int | float) else 0.0
     is_size = name in ("arm_inertia", "lag", "catch_rise")
+    least = -_LATEST_S if name == "lag" else 0.0
     return [
         (
             not is_word and not is_number,
             f'{shown}: needs "off", "fitted" or a number, got {term!r}',
         ),
-        (is_size and value < 0.0, f"{shown}: needs 0 or more, got {value:g}"),
+        (is_size and value < least, f"{shown}: needs {least:g} or more, got {value:g}"),
         (
             name == "catch_rise" and value > longest,
             f"{shown}: needs 0 to ΔT_peak, {longest:g} s, got {value:g} s",

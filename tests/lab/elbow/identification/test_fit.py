@@ -46,6 +46,19 @@ def found(movements: list[Movement]) -> ElbowFit:
         return fit(movements)
 
 
+def test_an_angle_that_is_late_is_put_right(
+    movements: list[Movement], found: ElbowFit
+) -> None:
+    late = [
+        replace(m, angle=np.interp(m.time - 0.005, m.time, m.angle)) for m in movements
+    ]
+    right = fit(late, lag=-0.005)
+    for name in NAMES:
+        assert right[name].value == pytest.approx(found[name].value, rel=0.01)
+    silent = fit(late)["catch_slope"].value
+    assert silent != pytest.approx(found["catch_slope"].value, rel=0.03)
+
+
 @pytest.mark.parametrize(
     ("joint", "noise", "options", "within"),
     [
