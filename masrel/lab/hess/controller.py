@@ -157,9 +157,9 @@ class Controller:
     After a catch there is none until the arm has been flexed faster than ν_th by 5 deg
     or for 100 ms: a catch throws a soft hand back by less, within one push.
 
-    Where a catch or post-catch ends otherwise, or clonus is given up, the torque goes
-    from where it stands to that of the law within `post_catch_ramp`, along a raised
-    cosine. A grip that is lost meanwhile ends this at once.
+    Where a catch or post-catch ends otherwise, the torque goes from where it stands to
+    that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
+    meanwhile ends this at once.
 
     A model that is not passive is guarded: in every phase it is a fault when the arm
     gets within 6 ms more than 0.78 of the speed that the torque would give it if nobody
@@ -192,7 +192,7 @@ class Controller:
         soft hand for a lost grip, too small a one notices a lost grip late.
     post_catch_ramp : float, optional
         How long the end of a catch or post-catch takes, s, 0 to 1; 0 is the step of
-        Fig. 7.
+        Fig. 7. A guarded model has its own law there.
     rate_hz : int, optional
         Steps a second.
 
@@ -384,7 +384,7 @@ class Controller:
             self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
             self._max_restored = -_INFINITE
         ends = self.phase != _PRE_CATCH and phase == _PRE_CATCH
-        if ends and self._post_catch_ramp:
+        if ends and self._post_catch_ramp and not self.is_guarded:
             self._easing = iter(self._post_catch_ramp)
             self._stood = self._command
             n_ticks = len(self._post_catch_ramp)
