@@ -188,10 +188,9 @@ def _parse_line(path: Path, number: int, line: bytes) -> tuple[Event, object]:
                     f"{path}: line {number}: {name} needs text, a number, true, false "
                     f"or null, or objects of these, got {entry!r}"
                 )
-    event = Event(
+    return Event(
         line=number, kind=kind, time_utc=time_utc, fields=MappingProxyType(fields)
-    )
-    return event, document["previous"]
+    ), document["previous"]
 
 
 def check_kinds(
@@ -433,7 +432,7 @@ def _is_event(path: Path, number: int, line: bytes, previous: str) -> bool:
 
 
 def _check_fact(path: Path, kind: str, name: str, fact: object) -> None:
-    rules = (
+    for is_broken, needs in (
         (
             fact is not None and not isinstance(fact, str | int | float),
             f"text, a number, true, false or null, got {type(fact).__name__}",
@@ -447,8 +446,7 @@ def _check_fact(path: Path, kind: str, name: str, fact: object) -> None:
             and any("\ud800" <= sign <= "\udfff" for sign in fact),
             f"valid Unicode text, got {fact!a}",
         ),
-    )
-    for is_broken, needs in rules:
+    ):
         if is_broken:
             raise SessionLogError(f"{path}: event {kind!r}: {name} needs {needs}")
 

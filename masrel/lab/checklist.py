@@ -17,6 +17,7 @@ from datetime import date
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Literal
 
 import masrel
@@ -24,19 +25,17 @@ from masrel._files import write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_TABLE, read_regular
-from masrel.lab.analysis import Analysis, analyze
+from masrel.lab.analysis import analyze
 from masrel.lab.conduct._plan_versions import plan_changes, plan_versions
 from masrel.lab.progress import (
-    RaterProgress,
-    SessionProgress,
     rater_progress,
     session_progress,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.ratings import Ratings, corrections_of, read_study_data, study_remarks
+from masrel.lab.ratings import corrections_of, read_study_data, study_remarks
 from masrel.lab.report._design import size_sentence
 from masrel.lab.report._material import TARGETS, coefficient_name, lines_of, macros
-from masrel.lab.report._pages import TEMPLATES, converted
+from masrel.lab.report._pages import TEMPLATES, as_markdown, converted
 from masrel.lab.run._state import read_session
 from masrel.lab.schedule._orders import orders_in_words
 from masrel.lab.schedule.presentation import _read_drawn
@@ -56,30 +55,8 @@ _CONDITIONS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _StudyFacts:
-    """What the record of a study says."""
-
-    # None before there are ratings
-    ratings: Ratings | None
-    analysis: Analysis | None
-    sessions: tuple[SessionProgress, ...]
-    # of sessions that have begun: the days, UTC, and heads by the keys of `_CONDITIONS`
-    days: Sequence[date]
-    heads: Sequence[Mapping[str, str]]
-    days_between: Sequence[int]  # of a rater's session and the one before, sorted
-    n_corrections: int
-    remarks: tuple[str, ...]
-    raters: tuple[RaterProgress, ...]
-    frozen: Sequence[object]  # events which kept the plan, that of the first draw first
-    changes: Sequence[object]  # of the plan
-    n_schedules: int  # drawn
-    n_concealed: int  # of these, those drawn from a secret that is not published
-    files: Mapping[str, Sequence[Path]]  # by what they are, from the study's folder
-
-
-def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
-    """Read everything of a study that a guideline asks for."""
+def _gather_facts(paths: StudyPaths, protocol: Protocol) -> SimpleNamespace:
+    """Read everything of a study that a guideline asks for, for a template."""
     ratings = analysis = None
     tables = [f for f in (paths.ratings_file, paths.published_file) if f.is_file()]
     if paths.logs() or tables:
@@ -108,16 +85,17 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
         "logs": [log for _, log, _, _ in begun],
         "ratings": tables[:1],
     }
-    return _StudyFacts(
-        ratings=ratings,
+    return SimpleNamespace(
+        ratings=ratings,  # None, as the analysis is, before there are any
         analysis=analysis,
         sessions=sessions,
+        # of sessions that have begun: the days, UTC, and what was the same
         days=[day for of_rater in days.values() for day in of_rater],
         heads=[
             {name: str(state.header.get(name)) for name in _CONDITIONS}
             for _, _, _, state in begun
         ],
-        days_between=sorted(
+        days_between=sorted(  # of a rater's session and the one before
             (after - before).days
             for of_rater in days.values()
             for before, after in pairwise(sorted(of_rater))
@@ -125,18 +103,20 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
         n_corrections=len(corrections_of(paths, protocol)),
         remarks=study_remarks(paths, protocol, include=()),
         raters=rater_progress(paths, protocol, sessions),
+        # events which kept the plan, that of the first draw first
         frozen=[event for _, event in plan_versions(paths)],
         changes=plan_changes(paths, protocol),
         n_schedules=len(drawn),
+        # of these, those drawn from a secret that is not published
         n_concealed=sum(s.commitment is not None for s in drawn) * (not is_published),
-        files={
+        files={  # by what they are, from the study's folder
             key: [file.relative_to(paths.root) for file in files]
             for key, files in named.items()
         },
     )
 
 
-def _words_of(facts: _StudyFacts, protocol: Protocol) -> dict[str, object]:
+def _words_of(facts: SimpleNamespace, protocol: Protocol) -> dict[str, object]:
     """Return what a template says facts with."""
     orders = "an order of their own, all orders equally likely"
     if protocol.schedule.scheme != "random-order":
@@ -331,7 +311,7 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
 
 
 def _filled(
-    facts: _StudyFacts, number: str, item: _Item, say: Callable[[str], list[str]]
+    facts: SimpleNamespace, number: str, item: _Item, say: Callable[[str], list[str]]
 ) -> _Item:
     to_add, names = item.to_add, item.facts
     if "ratings" in item.sources and facts.ratings is None:
@@ -351,14 +331,12 @@ def _filled(
     )
 
 
-def _notes(facts: _StudyFacts) -> tuple[str, ...]:
+def _notes(facts: SimpleNamespace) -> tuple[str, ...]:
     if facts.ratings is None:
         return ("No session has begun: what follows is the plan.",)
     counts = facts.ratings.simulated_counts
     return (counts,) if counts else ()
 
-
-_HEADINGS = ("Item", "Asks for", "State", "What the record says", "Files")
 
 _STATES: dict[_State, str] = {
     "filled": "filled from the record",
@@ -378,39 +356,21 @@ def write_checklist(checklist: _Checklist, path: Path) -> None:
 
 def checklist_markdown(checklist: _Checklist) -> str:
     """Return a checklist as Markdown: a section an item, then files with hashes."""
-    lines = [f"# {_plain(checklist.study)}", ""]
-    lines += [f"{_plain(text)}\n" for text in _introduction(checklist)]
-    for item in checklist.items:
-        lines += [f"## {item.number}. {_plain(item.topic)}", ""]
-        lines += [f"*{_STATES[item.state]}*", ""]
-        lines += [f"- {_plain(fact)}" for fact in item.facts]
-        lines += [f"- **Authors:** {_plain(item.to_add)}"] * bool(item.to_add)
-        lines += ["", f"Files: {names}"] if (names := _numbers(checklist, item)) else []
-        lines.append("")
-    lines += ["## Files", ""]
-    lines += [
-        f"{number}. {_plain(file)}: `{digest}`"
-        for number, (file, digest) in enumerate(checklist.files.items(), start=1)
-    ]
-    return "\n".join([*lines, "", f"Made by masrel {checklist.masrel_version}.", ""])
+    return _rendered(checklist, "md")
 
 
-_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})
-
-
-def _plain(text: str) -> str:
-    return " ".join(text.translate(_ESCAPES).split())
-
-
-def _introduction(checklist: _Checklist) -> tuple[str, ...]:
-    head = f"{checklist.title}: {checklist.reference}. Topics are in our words."
-    return (head, *checklist.notes, _summary(checklist))
-
-
-def _summary(checklist: _Checklist) -> str:
+def _rendered(checklist: _Checklist, form: str) -> str:
+    environment = template_environment(TEMPLATES)
+    environment.filters["md"] = as_markdown
     counts = Counter(item.state for item in checklist.items)
-    parts = [f"{counts[state]} {text}" for state, text in _STATES.items()]
-    return f"Of {len(checklist.items)} items {', '.join(parts)}."
+    of_states = ", ".join(f"{counts[state]} {text}" for state, text in _STATES.items())
+    return environment.get_template(f"checklist.{form}").render(
+        list=checklist,
+        states=_STATES,
+        summary=f"Of {len(checklist.items)} items {of_states}.",
+        style=files("masrel.pages").joinpath("templates/page.css").read_text("utf-8"),
+        files=lambda item: _numbers(checklist, item),
+    )
 
 
 def _numbers(checklist: _Checklist, item: _Item) -> str:
@@ -428,23 +388,8 @@ def _numbers(checklist: _Checklist, item: _Item) -> str:
     )
 
 
-def _html(checklist: _Checklist) -> str:
-    style = files("masrel.pages").joinpath("templates/page.css")
-    return (
-        template_environment(TEMPLATES)
-        .get_template("checklist.html")
-        .render(
-            list=checklist,
-            headings=_HEADINGS,
-            summary=_summary(checklist),
-            style=style.read_text(encoding="utf-8"),
-            files=lambda item: _numbers(checklist, item),
-        )
-    )
-
-
 _FORMS: dict[str, Callable[[_Checklist], str | bytes]] = {
-    ".html": _html,
+    ".html": lambda made: _rendered(made, "html"),
     ".md": checklist_markdown,
     ".docx": lambda made: converted(checklist_markdown(made), "docx", pictures={}),
 }

@@ -466,8 +466,7 @@ def write_analysis(
 def analysis_text(analysis: Analysis) -> str:
     """Return an analysis as its file has it."""
     document = as_analysis_document(analysis)
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    return text + "\n"
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def to_frame(results: "Iterable[Estimate] | Mapping[str, Estimate]") -> "DataFrame":

@@ -12,10 +12,10 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
+from masrel.tables._tables import Column, Table, interval_text, number
 
 if TYPE_CHECKING:
     from masrel.lab.analysis import Effect, GradeRegression
-    from masrel.tables._tables import Table
 
 
 @click.command("grading")
@@ -75,9 +75,7 @@ def grading(
     )
 
 
-def _table(regression: "GradeRegression") -> "Table":
-    from masrel.tables._tables import Column, Table
-
+def _table(regression: "GradeRegression") -> Table:
     return Table(
         name="grading",
         caption="Odds of a higher grade, per standard deviation",
@@ -99,18 +97,12 @@ def _table(regression: "GradeRegression") -> "Table":
 
 
 def _row(effect: "Effect") -> tuple[str, str, float, str]:
-    from masrel.tables._tables import interval_text, number
+    from masrel.lab.analysis._grading import PREDICTORS
 
+    unit = PREDICTORS[effect.predictor][1]
     return (
         effect.predictor,
-        f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
+        number(effect.per, 3) + f" {unit}" * (unit != "1"),
         effect.odds_ratio,
         interval_text(effect.low, effect.high, 2),
     )
-
-
-def _unit(predictor: str) -> str:
-    from masrel.lab.analysis._grading import PREDICTORS
-
-    unit = PREDICTORS[predictor][1]
-    return "" if unit == "1" else unit

@@ -703,8 +703,7 @@ def interrupted(motion: Motion, *, at: float, pause: float) -> Joined:
     """
     first = Part(motion=motion, begin=0.0, finish=at)
     rest = Hold(start=first.end, duration=pause)
-    last = Part(motion=motion, begin=at, finish=motion.duration)
-    return Joined([first, rest, last])
+    return Joined([first, rest, Part(motion=motion, begin=at, finish=motion.duration)])
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,8 +32,7 @@ def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
             return in_math(as_markdown(text).replace("$", r"\$"))
 
     environment.filters |= {"md": escape, "cells": page_cells, "rule": _rule}
-    template = environment.get_template("report.md")
-    return template.render(document=document, form=form)
+    return environment.get_template("report.md").render(document=document, form=form)
 
 
 def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:

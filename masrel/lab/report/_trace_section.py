@@ -32,6 +32,7 @@ from masrel.lab.report._material import (
     MANY_MODELS,
     MANY_RATERS,
     MANY_STRETCHES,
+    MODEL,
     SUPPLEMENT,
     Material,
     at_ranks,
@@ -54,7 +55,6 @@ _AROUND_S = 0.25  # shown before and after a measured stretch
 _SLOWEST_DRAWN_DEG_S = 1.0
 _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
 
-_MODEL = Column(key="model", heading="Model", align="left")
 
 _Floats = NDArray[np.float64]
 
@@ -66,8 +66,7 @@ def speeds_section(material: Material) -> Iterator[Content]:
         yield lacking(None if speeds is None else speeds.reason)
         return
     has_many = _has_many(speeds.values)
-    text = text_of("speeds.txt", "speeds", speeds.n_missing, has_many)
-    yield Paragraph(text=text)
+    yield Paragraph(text=text_of("speeds.txt", "speeds", speeds.n_missing, has_many))
     by_model, by_rater = speed_tables(material)
     yield by_model
     texts = "; ".join(
@@ -228,8 +227,7 @@ def _traced(
         ranks = at_ranks(known)
         shown = [ranks[name] for name in ("lowest", "median", "highest")]
         steps = (np.arange(_N_IN_BAND) + 0.5) / _N_IN_BAND
-        quantiles = np.quantile(known, steps).tolist()
-        band = _band(joint, [*map(stretch, quantiles)])
+        band = _band(joint, [*map(stretch, np.quantile(known, steps).tolist())])
     digits = _whole_or_tenths(known)
     grade = ""
     if model.intended_grade is not None:
@@ -259,11 +257,10 @@ def _band(joint: JointModel, motions: Sequence[Motion]) -> dict[str, _Floats]:
     )
     at = [(motion, np.minimum(time, motion.duration)) for motion in motions]
     band = {"time": time}
-    columns = {
+    for name, column in {
         "angle": [np.degrees(motion.angle(times)) for motion, times in at],
         "torque": [torque_of(motion, times) for motion, times in at],
-    }
-    for name, column in columns.items():
+    }.items():
         ordered = np.sort(np.where(under_way, np.stack(column), np.inf), axis=0)
         band[name] = np.empty((len(_BAND_SHARES), time.size))
         for n in np.unique(n_under_way):
@@ -322,7 +319,7 @@ def _peak_table(
             f"Peak model torque at each rater's mean speed, session {session} (N·m)"
         ),
         columns=(
-            _MODEL,
+            MODEL,
             *(Column(key=f"{r}_nm", heading=r, digits=2, where=where) for r in raters),
             Column(key="least_nm", heading="Min", digits=2),
             Column(key="median_nm", heading="Median", digits=2),
@@ -352,8 +349,7 @@ def measured_blocks(material: Material) -> Iterator[Paragraph | Drawing]:
     if not recordings:
         text = "Measured torque is not in these data: no recording has it."
         yield Paragraph(text=text, absent=True)
-    starts = range(0, len(recordings), _PANELS_PER_FIGURE)
-    for nth, first in enumerate(starts, start=1):
+    for nth, first in enumerate(range(0, len(recordings), _PANELS_PER_FIGURE), start=1):
         shown = recordings[first : first + _PANELS_PER_FIGURE]
         yield _measured_drawing(material, shown, nth)
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         GradeRequest,
         GradeSource,
         QuestionRequest,
-        ScriptGrades,
         Skip,
         StretchGrade,
     )
@@ -36,7 +35,6 @@ __all__ = [
     "GradeSource",
     "PaperGrades",
     "QuestionRequest",
-    "ScriptGrades",
     "SessionLog",
     "SessionSummary",
     "SimulatedGrades",
@@ -57,7 +55,6 @@ _HOMES = {
     "GradeSource": "_grade_sources",
     "PaperGrades": "console",
     "QuestionRequest": "_grade_sources",
-    "ScriptGrades": "_grade_sources",
     "SessionSummary": "session",
     "SimulatedGrades": "_simulated_raters",
     "Skip": "_grade_sources",

@@ -1,6 +1,6 @@
 """What a source of grades is, and the one that reads them off a script."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -231,64 +231,3 @@ class GradeSource:
     def answer(self, request: QuestionRequest) -> Answer:  # noqa: ARG002 - as all
         """Return the answer, or None for none."""
         return None
-
-
-class ScriptGrades(GradeSource):
-    """Grades and answers fixed beforehand.
-
-    Parameters
-    ----------
-    grades : mapping of str to str, or sequence of str
-        Grade by code, or one grade a position.
-    practice : mapping of str to str, or sequence of str, optional
-        The same for practice.
-    answers : mapping of str to str, int, float or None, optional
-        Answer by ``questionnaire.question``, whatever it is about.
-    """
-
-    name: ClassVar[str] = "script"
-
-    def __init__(
-        self,
-        grades: Mapping[str, str] | Sequence[str],
-        *,
-        practice: Mapping[str, str] | Sequence[str] = (),
-        answers: Mapping[str, Answer] | None = None,
-    ) -> None:
-        self._grades = grades
-        self._practice = practice
-        self._answers = answers or {}
-
-    def grade(self, request: GradeRequest) -> str | None:
-        """Return the grade of the script.
-
-        Parameters
-        ----------
-        request : GradeRequest
-            What was presented.
-
-        Returns
-        -------
-        str
-            The grade.
-
-        Raises
-        ------
-        ParameterError
-            If the script has none for it.
-        """
-        presentation = request.presentation
-        grades = self._practice if request.practice else self._grades
-        if isinstance(grades, Mapping):
-            if presentation.code in grades:
-                return grades[presentation.code]
-        elif presentation.position <= len(grades):
-            return grades[presentation.position - 1]
-        raise ParameterError(
-            f"script: needed a grade of position {presentation.position}, "
-            f"code {presentation.code}"
-        )
-
-    def answer(self, request: QuestionRequest) -> Answer:
-        """Return the answer of the script; None where it has none."""
-        return self._answers.get(f"{request.questionnaire.id}.{request.question.id}")

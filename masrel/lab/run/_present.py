@@ -272,8 +272,7 @@ def _hand_speeds(protocol: Protocol, request: GradeRequest) -> list[float]:
     # rad/s of the simulated hand, by stretch; none when a person moves the arm
     if not has_simulated_hand(protocol.device):
         return []
-    speeds = intended_speeds(protocol, key_of(request))
-    return [math.radians(speed) for speed in speeds]
+    return [math.radians(speed) for speed in intended_speeds(protocol, key_of(request))]
 
 
 def _hand(

@@ -177,8 +177,7 @@ def run_session(
     recover_conduct(study)
     refuse_withdrawn(study, rater)
     if rehearsal:
-        begun = begin_rehearsal(study, protocol, rater, session)
-        study, schedule, checksum = begun
+        study, schedule, checksum = begin_rehearsal(study, protocol, rater, session)
     else:
         schedule = _drawn_schedule(study, protocol, rater, session)
         file = study.schedule_file(rater, session)

@@ -371,8 +371,7 @@ def read_schedule(path: Path) -> Schedule:
 
 def _closed(schedule: Schedule) -> Schedule:
     """Return a schedule without its models."""
-    hidden = tuple(map(_hidden, schedule.presentations))
-    return replace(schedule, presentations=hidden)
+    return replace(schedule, presentations=tuple(map(_hidden, schedule.presentations)))
 
 
 def _hidden(shown: Presentation) -> Presentation:

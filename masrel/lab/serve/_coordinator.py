@@ -31,7 +31,7 @@ from masrel.lab.conduct import (
 )
 from masrel.lab.conduct._study_log import check_choice, check_rater
 from masrel.lab.progress import study_status
-from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.run import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
@@ -83,10 +83,6 @@ def _unblind(*where: Any, **fields: Any) -> str:
     )
 
 
-def _note(study: StudyPaths, protocol: Protocol, **fields: Any) -> None:
-    record_note(study, protocol, Note(**fields))
-
-
 _SIGNED = ("who", "why")
 _SESSION = ("rater", "session")
 ACTIONS = {
@@ -97,7 +93,7 @@ ACTIONS = {
         "All {result} schedules are drawn.",
     ),
     "note": _Action(
-        _note,
+        lambda study, protocol, **of: record_note(study, protocol, Note(**of)),
         ("text", "who"),
         {
             "kind": "note",
@@ -200,8 +196,7 @@ class CoordinatorPages(Pages):
         if is_rehearsal:
             # while one starts, the last one is another rehearsal's
             starts = self._manager.state()["screen"] == "starting"
-            of_last = last_rehearsal(self._study, rater, session)
-            file = None if starts else of_last
+            file = None if starts else last_rehearsal(self._study, rater, session)
         with contextlib.suppress(MasrelError, OSError):
             events = () if file is None else read_log(file)[-_N_LOG:]
             return [
@@ -227,8 +222,7 @@ class CoordinatorPages(Pages):
             fields["id"] = secrets.token_hex(8)
         sent = json.dumps([name, fields], sort_keys=True)
         if sent not in self._acts:
-            acting = self._done(name, fields)
-            self._acts[sent] = asyncio.create_task(acting)
+            self._acts[sent] = asyncio.create_task(self._done(name, fields))
             if len(self._acts) > _N_ACTS:
                 self._acts.popitem(last=False)
         return JSONResponse(await asyncio.shield(self._acts[sent]))
@@ -251,8 +245,7 @@ class CoordinatorPages(Pages):
         return {"text": sentence}
 
     def _record(self, action: _Action, fields: Fields) -> str:
-        texts = needed(fields, *action.needed)
-        texts |= {
+        texts = needed(fields, *action.needed) | {
             name: text(fields, name) or usual for name, usual in action.optional.items()
         }
         protocol = read_protocol(self._study.protocol)
@@ -261,8 +254,7 @@ class CoordinatorPages(Pages):
 
     async def _start(self, fields: Fields) -> str:
         where = needed(fields, *_SESSION)
-        rehearsal = fields.get("rehearsal") is True
-        await self._manager.start(**where, rehearsal=rehearsal)
+        await self._manager.start(**where, rehearsal=fields.get("rehearsal") is True)
         return "Session {session} of {rater} is started.".format(**where)
 
     async def _leave(self, fields: Fields) -> str:  # noqa: ARG002 - as all
@@ -307,8 +299,7 @@ def _shown(fields: Any) -> dict[str, Any]:
 def _frame(tail: SampleTail, *, is_sealed: bool) -> dict[str, Any] | None:
     # of a sealed study not what is felt
     columns = ("time_s", "angle_deg", "command_torque_nm", "phase")
-    rows = tail.new_rows(*columns, every=_EVERY)
-    seconds, angles, torques, phases = rows.values()
+    seconds, angles, torques, phases = tail.new_rows(*columns, every=_EVERY).values()
     if not seconds:
         return None
     return {

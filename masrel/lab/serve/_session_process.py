@@ -259,8 +259,7 @@ class PageGrades(GradeSource):
                 case {"kind": "correct", **fields}:
                     self._correct(request, fields)
                 case {"kind": "stop"}:
-                    why = f"by an emergency stop ({message['who']})"
-                    raise _stopped(request, why)
+                    raise _stopped(request, f"by an emergency stop ({message['who']})")
                 case {"kind": "leave"}:
                     raise _stopped(request, message.get("why", "on request"))
 

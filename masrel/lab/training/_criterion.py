@@ -20,13 +20,14 @@ from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.agreement import COEFFICIENTS, declared_weights
 from masrel.agreement._engine import Formula
 from masrel.lab.protocol import Protocol
 from masrel.lab.training._trainees import (
     SKILLS,
+    Floats,
+    Integers,
     Skill,
     confusion_with_kappa,
     draw_training,
@@ -34,8 +35,6 @@ from masrel.lab.training._trainees import (
 
 _COHEN = cast("Formula", COEFFICIENTS["cohen_kappa"].formula)
 
-_Floats = NDArray[np.float64]
-_Integers = NDArray[np.int64]
 
 N_SIMULATED = 5_000
 """Simulated trainees of each kind: an error of 5 % is then known to 0.3 %."""
@@ -83,8 +82,8 @@ class Criterion:
         return len(self.intended)
 
     def evidence(
-        self, intended: _Integers, codes: _Integers, weights: _Floats | None = None
-    ) -> _Floats:
+        self, intended: Integers, codes: Integers, weights: Floats | None = None
+    ) -> Floats:
         """Return the evidence after each set of presentations.
 
         Parameters
@@ -111,7 +110,7 @@ class Criterion:
             np.maximum(looks, evidence, out=looks)
         return largest
 
-    def kappa(self, confusion: _Floats) -> float:
+    def kappa(self, confusion: Floats) -> float:
         """Return kappa of a rater who grades by these probabilities.
 
         Parameters
@@ -128,11 +127,11 @@ class Criterion:
         sums = (freq[:, None] * confusion).ravel() @ self._features()
         return float(_COHEN.value(sums, self._disagreement()))
 
-    def _disagreement(self) -> _Floats:
+    def _disagreement(self) -> Floats:
         # of every two grades
         return np.asarray(declared_weights(self.weights, self.grades).v)
 
-    def _features(self) -> _Floats:
+    def _features(self) -> Floats:
         # (n_grades², n_features): of each pair of an intended grade and another
         ranks = np.arange(len(self.grades))
         pairs = np.stack(np.meshgrid(ranks, ranks, indexing="ij"), axis=-1)
@@ -141,8 +140,8 @@ class Criterion:
         )
 
     def _sums(
-        self, intended: _Integers, codes: _Integers, weights: _Floats | None
-    ) -> _Floats:
+        self, intended: Integers, codes: Integers, weights: Floats | None
+    ) -> Floats:
         # cumulative over sets, from 0 on
         n_sets = intended.shape[-1] // self.n_models
         cells = (intended * len(self.grades) + codes)[..., : n_sets * self.n_models]
@@ -267,7 +266,7 @@ def calibrate(
 
 def _simulated_evidence(
     criterion: Criterion, kappa: float, n_simulated: int, rng: np.random.Generator
-) -> dict[Skill, _Floats]:
+) -> dict[Skill, Floats]:
     # By kind the largest evidence of each trainee with this kappa, (n_simulated,); not
     # of a kind that has none
     largest = {}
@@ -284,7 +283,7 @@ def _simulated_evidence(
     return largest
 
 
-def _boundary(largest: _Floats, share: float) -> float:
+def _boundary(largest: Floats, share: float) -> float:
     # largest evidence of each trainee: (n_simulated,). Two standard errors fewer come
     # to the boundary than may, so that other trainees seldom pass more often.
     values, n = np.sort(largest)[::-1], largest.size

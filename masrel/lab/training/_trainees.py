@@ -12,8 +12,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-_Floats = NDArray[np.float64]
-_Integers = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 Skill = Literal["noise", "range", "lapses", "shift", "pair"]
 """How a trainee errs; what varies from trainee to trainee of a kind is one number."""
@@ -31,7 +31,7 @@ _MAX_NOISE = 50.0  # grades: what is perceived then says nothing
 
 def confusion(
     skill: Skill, amount: float, n_grades: int, intended: Sequence[int]
-) -> _Floats:
+) -> Floats:
     """Return the probability of each grade for each intended one.
 
     Parameters
@@ -81,7 +81,7 @@ def _middle(intended: Sequence[int]) -> tuple[int, int]:
     return codes[middle], codes[middle + 1]
 
 
-def _noisy(sd: float, shift: float, n_grades: int) -> _Floats:
+def _noisy(sd: float, shift: float, n_grades: int) -> Floats:
     # (n_grades, n_grades): of a normal variable around each grade, rounded
     cuts = np.arange(n_grades - 1) + 0.5
     distances = (cuts - np.arange(n_grades)[:, None] - shift) / (sd * math.sqrt(2.0))
@@ -94,10 +94,10 @@ def _noisy(sd: float, shift: float, n_grades: int) -> _Floats:
 def confusion_with_kappa(
     skill: Skill,
     kappa: float,
-    kappa_of: Callable[[_Floats], float],
+    kappa_of: Callable[[Floats], float],
     n_grades: int,
     intended: Sequence[int],
-) -> _Floats | None:
+) -> Floats | None:
     """Return the confusion of a trainee with some kappa, or None if there is none."""
     low, high = 1e-3, 1.0 if skill == "pair" else _MAX_NOISE
     ends = [kappa_of(confusion(skill, x, n_grades, intended)) for x in (low, high)]
@@ -113,12 +113,12 @@ def confusion_with_kappa(
 
 
 def draw_training(
-    confusion: _Floats,
+    confusion: Floats,
     intended: Sequence[int],
     order: str,
     shape: tuple[int, int],
     rng: np.random.Generator,
-) -> tuple[_Integers, _Integers, _Floats | None]:
+) -> tuple[Integers, Integers, Floats | None]:
     """Return codes of intended grades and of those given, and how much each counts."""
     # all of the shape, so many trainees and presentations; None where all count alike
     codes = np.asarray(intended, dtype=np.int64)
@@ -130,8 +130,7 @@ def draw_training(
     models, grades = np.empty(shape, dtype=np.int64), np.empty(shape, dtype=np.int64)
     for at in range(shape[1]):
         shares = (1 + wrong).cumsum(axis=1)
-        drawn = rng.integers(0, shares[:, -1])
-        model = (drawn[:, None] >= shares).sum(axis=1)
+        model = (rng.integers(0, shares[:, -1])[:, None] >= shares).sum(axis=1)
         models[:, at] = model
         grades[:, at] = draw_grades(confusion[codes[model]], rng)
         wrong[trainees, model] = grades[:, at] != codes[model]
@@ -140,8 +139,8 @@ def draw_training(
 
 
 def adaptive_weights(
-    models: _Integers, wrong: NDArray[np.bool_], n_models: int
-) -> _Floats:
+    models: Integers, wrong: NDArray[np.bool_], n_models: int
+) -> Floats:
     """Return how much each presentation in adaptive order counts, 1 in the mean."""
     # models, from 0, and whether they were misgraded: both (..., n_presentations). A
     # model counts the less the likelier it was to be drawn, so that kappa is that of
@@ -158,7 +157,7 @@ def adaptive_weights(
 
 def draw_blocks(
     n_models: int, shape: tuple[int, int], rng: np.random.Generator
-) -> _Integers:
+) -> Integers:
     """Return models in random order, each at least once in every block."""
     # takes and returns the shape (n_trainees, n_presentations)
     size = BLOCK_SETS * n_models
@@ -171,10 +170,10 @@ def draw_blocks(
     return models.reshape(shape[0], -1)[:, : shape[1]]
 
 
-def draw_grades(probabilities: _Floats, rng: np.random.Generator) -> _Integers:
+def draw_grades(probabilities: Floats, rng: np.random.Generator) -> Integers:
     """Return a grade for each row of probabilities of the grades."""
     # one grade a row, whatever shape the rows stand in
     rows = probabilities.cumsum(axis=-1)
     shares = rng.random(rows.shape[:-1])[..., None]
-    codes: _Integers = (shares >= rows).sum(axis=-1, dtype=np.int64)
+    codes: Integers = (shares >= rows).sum(axis=-1, dtype=np.int64)
     return codes.clip(max=rows.shape[-1] - 1)

@@ -28,9 +28,10 @@ from masrel.lab.conduct import (
     record_unblinding,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.run import ScriptGrades, SessionLog, record_correction, run_session
+from masrel.lab.run import SessionLog, record_correction, run_session
 from masrel.lab.schedule import read_schedule
 from tests.files import edit
+from tests.lab.script import ScriptGrades
 
 Small = tuple[StudyPaths, Protocol]
 BY = {"who": " MK ", "why": "moved away"}

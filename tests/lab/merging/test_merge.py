@@ -20,11 +20,12 @@ from masrel.lab.merging import merge_studies
 from masrel.lab.paper import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs
-from masrel.lab.run import ScriptGrades, SimulatedGrades, run_session
+from masrel.lab.run import SimulatedGrades, run_session
 from masrel.lab.training import SimulatedTrainee, train_rater
 from masrel.lab.verification import anchors_of, verify_study
 from tests.files import contents, edit
 from tests.lab.cli.test_train import RULES
+from tests.lab.script import ScriptGrades
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
 Sites = tuple[StudyPaths, StudyPaths]

@@ -20,12 +20,12 @@ from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.lab.ratings import study_remarks
 from masrel.lab.run import (
     PaperGrades,
-    ScriptGrades,
     read_log,
     record_day,
     run_session,
 )
 from tests.files import edit
+from tests.lab.script import ScriptGrades
 
 Small = tuple[StudyPaths, Protocol]
 TEST = datetime(2026, 5, 4, 12, tzinfo=UTC)  # the day of the first session

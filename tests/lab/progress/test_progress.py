@@ -18,8 +18,9 @@ from masrel.lab.progress import (
     session_progress,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run import ScriptGrades, record_correction, run_session
+from masrel.lab.run import record_correction, run_session
 from masrel.lab.schedule import read_schedule, write_schedules
+from tests.lab.script import ScriptGrades
 
 Small = tuple[StudyPaths, Protocol]
 BY = {"who": "MK", "why": "moved away"}

@@ -9,12 +9,12 @@ from masrel.errors import RatingsError, SessionLogError
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import rating_matrix, ratings_from_logs, write_ratings
 from masrel.lab.run import (
-    ScriptGrades,
     SessionLog,
     run_session,
 )
 from masrel.lab.schedule import read_schedule
 from tests.lab.run.conftest import new_study, small
+from tests.lab.script import ScriptGrades
 
 __all__ = ["new_study", "small"]  # fixtures of the same small study
 

@@ -21,7 +21,6 @@ from masrel.lab.ratings import (
     write_ratings,
 )
 from masrel.lab.run import (
-    ScriptGrades,
     SimulatedGrades,
     read_log,
     record_correction,
@@ -32,6 +31,7 @@ from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from tests.cli.process import Caller, Done
 from tests.lab.run.test_session import console, run
+from tests.lab.script import ScriptGrades
 
 Small = tuple[StudyPaths, Protocol]
 

@@ -34,7 +34,6 @@ from masrel.lab.recording import read_recording
 from masrel.lab.run import (
     Event,
     GradeRequest,
-    ScriptGrades,
     SimulatedGrades,
     StretchGrade,
     read_log,
@@ -44,6 +43,7 @@ from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.run.test_session import console, run
+from tests.lab.script import ScriptGrades
 
 Small = tuple[StudyPaths, Protocol]
 New = Callable[..., Small]

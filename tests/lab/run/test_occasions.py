@@ -26,7 +26,6 @@ from masrel.lab.run import (
     ConsoleGrades,
     Event,
     GradeRequest,
-    ScriptGrades,
     SessionSummary,
     SimulatedGrades,
     read_log,
@@ -36,6 +35,7 @@ from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from tests.lab.run.test_command import typed
 from tests.lab.run.test_session import console
+from tests.lab.script import ScriptGrades
 
 New = Callable[..., tuple[StudyPaths, Protocol]]
 

@@ -22,12 +22,13 @@ from masrel.lab.conduct import (
 from masrel.lab.merging import merge_studies
 from masrel.lab.protocol import Protocol, StudyPaths, copy_template, read_protocol
 from masrel.lab.ratings import ratings_from_logs, read_study_data
-from masrel.lab.run import ScriptGrades, run_session
+from masrel.lab.run import run_session
 from masrel.lab.schedule import copy_for_site, read_schedule
 from masrel.lab.sealing import is_sealed, unseal_study
 from masrel.lab.verification import verify_study
 from tests.files import edit
 from tests.lab.flow.conftest import run as masrel
+from tests.lab.script import ScriptGrades
 
 Sealed = tuple[StudyPaths, Protocol]
 BY = {"who": "MK", "why": "all is done"}

@@ -31,7 +31,6 @@ from masrel.lab.run import (
     ConsoleGrades,
     GradeRequest,
     GradeSource,
-    ScriptGrades,
     SessionSummary,
     SimulatedGrades,
     read_log,
@@ -40,6 +39,7 @@ from masrel.lab.run import (
 )
 from masrel.lab.schedule import read_schedule
 from masrel.scales import MODIFIED_ASHWORTH, Scale
+from tests.lab.script import ScriptGrades
 
 Small = tuple[StudyPaths, Protocol]
 

@@ -19,8 +19,9 @@ from masrel.lab.conduct import read_conduct
 from masrel.lab.hess import EmergencyStop
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import read_recording
-from masrel.lab.run import GradeRequest, ScriptGrades, read_log, run_session
+from masrel.lab.run import GradeRequest, read_log, run_session
 from masrel.lab.schedule import read_schedule
+from tests.lab.script import ScriptGrades
 from tests.lab.serve.pages import (
     ACTIONS,
     EACH,

@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 from scipy.special import log_ndtr, stdtrit
 
@@ -18,6 +17,7 @@ from masrel.errors import ConvergenceError
 from masrel.lab.elbow.identification._catches import (
     MIN_GAIN,
     MIN_SIGNAL,
+    Bools,
     Catch,
     CatchLevels,
     Law,
@@ -28,6 +28,7 @@ from masrel.lab.elbow.identification._catches import (
 from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
     FittedParameter,
+    Floats,
     Rows,
     Step,
     fitted,
@@ -39,8 +40,6 @@ from masrel.lab.elbow.identification._equations import (
     mills,
 )
 from masrel.lab.elbow.parameters import ElbowParameters
-
-_Floats = NDArray[np.float64]
 
 # Mean speeds must span this, rad/s: less is one speed, which has no slope.
 _MIN_SPAN = math.radians(5.0)
@@ -123,9 +122,7 @@ def _travel(
     return _step(title, "catch_travel", rows, level, reason)
 
 
-def on_the_line(
-    catches: Sequence[Catch], constants: ElbowParameters
-) -> NDArray[np.bool_]:
+def on_the_line(catches: Sequence[Catch], constants: ElbowParameters) -> Bools:
     """Return which catches are on the line of (2), not where θ_L of (6) holds."""
     speeds = np.array([catch.mean_speed for catch in catches])
     speeds = np.maximum(speeds, constants.slowest_mean_speed)
@@ -143,7 +140,7 @@ def on_the_line(
 
 def fit_catch_line(
     catches: Sequence[Catch],
-    on_line: NDArray[np.bool_],
+    on_line: Bools,
     constants: ElbowParameters,
     *,
     level: float,
@@ -164,10 +161,10 @@ def fit_catch_line(
         )
         return Step(name=title, estimates=estimates, residual_sd=math.nan)
 
-    def left(x: _Floats) -> _Floats:
+    def left(x: Floats) -> Floats:
         return np.array([line_row(c, x[0], x[1], slowest)[0] for c in used])
 
-    def slopes(x: _Floats) -> _Floats:
+    def slopes(x: Floats) -> Floats:
         return np.array([line_row(c, x[0], x[1], slowest)[1:] for c in used])
 
     plain = np.polyfit(-speeds, [catch.angle for catch in used], 1)[::-1]
@@ -247,9 +244,9 @@ def _limit(
 class Travels(NamedTuple):
     """Travels that were seen, and limits behind which the others lie, (n,) each."""
 
-    seen: _Floats
-    limit: _Floats
-    limit_sd: _Floats
+    seen: Floats
+    limit: Floats
+    limit_sd: Floats
 
     def log_likelihood(self, mean: float, sd: float) -> float:
         """Evaluate the log-likelihood of normal travels, without its constant."""
@@ -258,7 +255,7 @@ class Travels(NamedTuple):
         density = -0.5 * float(scaled @ scaled) - self.seen.size * math.log(sd)
         return density + float(log_ndtr(z).sum())
 
-    def score(self, mean: float, sd: float) -> _Floats:
+    def score(self, mean: float, sd: float) -> Floats:
         """Differentiate the log-likelihood by mean and sd."""
         scaled = (self.seen - mean) / sd
         # travels scatter, and so does what is seen of an end
@@ -318,7 +315,7 @@ def fit_censored(travels: Travels, *, level: float) -> tuple[FittedParameter, fl
     a, b = (travels.score(mean - h, sd) - travels.score(mean + h, sd)) / (2.0 * h)
     _, d = (travels.score(mean, sd - h) - travels.score(mean, sd + h)) / (2.0 * h)
     variance = d / (a * d - b * b)  # of the mean, the spread being unknown
-    estimate = FittedParameter(
+    return FittedParameter(
         name="catch_travel",
         value=mean,
         standard_error=math.sqrt(variance * number / (number - 1.0)),
@@ -327,8 +324,7 @@ def fit_censored(travels: Travels, *, level: float) -> tuple[FittedParameter, fl
         high=_root(spare, mean, sd),
         level=level,
         n_trials=number + travels.limit.size,
-    )
-    return estimate, sd
+    ), sd
 
 
 def _root(function: Callable[[float], float], start: float, step: float) -> float:

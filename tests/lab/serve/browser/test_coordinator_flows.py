@@ -7,7 +7,8 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from masrel.lab.protocol import read_protocol
-from masrel.lab.run import ScriptGrades, read_log, run_session
+from masrel.lab.run import read_log, run_session
+from tests.lab.script import ScriptGrades
 from tests.lab.serve.browser.conftest import MakeStage, at_work
 from tests.lab.serve.browser.stages import Stage
 from tests.lab.serve.browser.test_rater_flows import broken, near_the_stop, tab_to
