@@ -97,7 +97,7 @@ PULLING = ("beat_rate_hz = 5.0", "base_torque_nm = 2.1")
         (
             "small",
             [('backend = "simulated"', 'backend = "nonesuch"')],
-            "device.backend: needed one of puck, simulated, got",
+            "device.backend: needed one of moteus, puck, simulated, got",
         ),
         (
             "small",

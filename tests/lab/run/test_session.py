@@ -263,7 +263,7 @@ def test_a_device_that_no_session_can_use_is_refused(
     study, protocol = small
     device = msgspec.structs.replace(protocol.device, backend=backend)
     other = msgspec.structs.replace(protocol, device=device)
-    words = f"device.backend: needed one of puck, simulated, got '{backend}'"
+    words = f"device.backend: needed one of moteus, puck, simulated, got '{backend}'"
     with pytest.raises(ParameterError, match=words):
         run_session(study, other, "R1", "test", grades=ScriptGrades([]), clock=clock)
     assert not study.log_file("R1", "test").exists()
