@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 Target = Literal["items", "raters", "both"]
-"""What a new study would draw anew: the population an interval generalises to."""
+"""The population that an interval generalises to: items, raters, or both."""
 
 IntervalMethod = Literal[
     "auto",
@@ -32,7 +32,7 @@ IntervalMethod = Literal[
     "bootstrap",
     "posterior",
 ]
-"""Kinds of intervals; "auto" is the newest of the rules that choose one."""
+"""Methods of intervals; "auto" is the newest rule that chooses one."""
 
 # Whose standard error an interval is made of, where it is not our own
 _Convention = Literal["irrcac", "spss", "over_n"]

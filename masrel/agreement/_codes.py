@@ -114,7 +114,9 @@ def code_ratings(
     [[0, 1], [2, -1]]
     """
     if isinstance(ratings, CountedRatings):
-        needed = "ratings: needs to know who rated what, got counts of a table"
+        needed = (
+            "ratings: needs ratings that show who rated what, got a table of counts"
+        )
         refuse((not ratings.knows_raters, needed), error=RatingsError)
         ratings = ratings.coded
     if isinstance(ratings, CodedRatings):
@@ -200,7 +202,7 @@ def _rows_of(
         return list(table.tolist())
     if not is_row(table):
         raise RatingsError(
-            f"{name}: needs a table, with a row of labels an item, got {shown(table)}"
+            f"{name}: needs a table with one row of labels per item, got {shown(table)}"
         )
     rows: list[list[Any]] = []
     for row in table:
@@ -256,21 +258,21 @@ def _refuse_columns(names: Sequence[str], table: NDArray[Any]) -> None:
     are_names = item >= 0 and differ[item] and all(map(_NAME.fullmatch, labels[item]))
     # a model may be a rater, and rank items
     is_item = are_names and not (_letters(names[item]) == "model" and all(differ))
-    escape = "" if is_mixed else "; frame.to_numpy() if it is not so"
+    escape = "" if is_mixed else "; use frame.to_numpy() if that is wrong"
     if _is_long(roles, labels) or (is_mixed and len(names) > 2 and not is_item):
         columns = {role: repr(names[place]) for role, place in roles.items()}
         call = ", ".join(f"{role}={columns.get(role, '…')}" for role in _LONG)
         raise RatingsError(
-            f"ratings: the columns {', '.join(map(repr, names[:6]))} look like one row "
-            "a rating, and a coefficient takes one row an item and one column a rater: "
-            f"masrel.agree(frame, {call}) reads them, code_long(frame, {call}) makes "
-            f"ratings of them{escape}"
+            f"ratings: the columns {', '.join(map(repr, names[:6]))} look like one "
+            "row per rating, but a coefficient takes one row per item and one column "
+            f"per rater: masrel.agree(frame, {call}) reads them, code_long(frame, "
+            f"{call}) turns them into ratings{escape}"
         )
     if is_item:
         raise RatingsError(
-            f"ratings: the column {names[item]!r} names items, and would be a rater: "
-            f"masrel.agree(frame, item={names[item]!r}) reads it so, and so does "
-            f"frame.set_index({names[item]!r}) in pandas{escape}"
+            f"ratings: the column {names[item]!r} names the items but would be read "
+            f"as a rater: masrel.agree(frame, item={names[item]!r}) reads it as "
+            f"names, and so does frame.set_index({names[item]!r}) in pandas{escape}"
         )
 
 
@@ -314,16 +316,17 @@ def side_by_side(first: Any, second: Any) -> Any:
     refuse(
         (
             len(lengths) < 2,
-            "ratings, other: needs the labels of two raters, a sequence each, or one "
-            f"table alone, got {type(first).__name__} and {type(second).__name__}",
+            "ratings, other: needs the labels of two raters, one sequence for each, "
+            f"or a single table, got {type(first).__name__} and "
+            f"{type(second).__name__}",
         ),
         error=RatingsError,
     )
     refuse(
         (
             lengths[0] != lengths[1],
-            "ratings, other: needs a label of every item from both raters, in one "
-            f"order, or None, got {lengths[0]} and {lengths[1]} labels",
+            "ratings, other: needs a label or None for every item from both raters, "
+            f"in the same order, got {lengths[0]} and {lengths[1]} labels",
         ),
         error=RatingsError,
     )
@@ -331,9 +334,9 @@ def side_by_side(first: Any, second: Any) -> Any:
         refuse(
             (
                 not first.index.equals(second.index),
-                "ratings, other: needs two Series of one index, got two that differ: "
-                "pandas.concat([a, b], axis=1) puts labels together by their index, "
-                "a.to_numpy() and b.to_numpy() by their place",
+                "ratings, other: needs two Series with the same index, got different "
+                "ones: pandas.concat([a, b], axis=1) matches labels by index, "
+                "a.to_numpy() and b.to_numpy() by position",
             ),
             error=RatingsError,
         )
@@ -481,7 +484,7 @@ def _repeats(names: Any) -> RatingsError:
     again = names[names.duplicated()].drop_duplicates().to_numpy(object).tolist()
     named = "; ".join(f"{item!r} by {rater!r}" for item, rater in again[:5])
     return RatingsError(
-        "ratings: each rater needs to rate an item once, rated more than once: "
+        "ratings: each rater needs to rate an item once; rated more than once: "
         + named
         + (f" and {len(again) - 5} more" if len(again) > 5 else "")
         + '; repeated="first" or "last" keeps one of them'
@@ -511,7 +514,7 @@ def code_pairs(
     refuse(
         (
             len({len(table) for table in tables}) != 1,
-            "pairs: needs at least one rater, and the same items of every rater, got "
+            "pairs: needs at least one rater, and the same items for every rater, got "
             f"{', '.join(str(len(table)) for table in tables) or 'no'} items",
         ),
         error=RatingsError,
@@ -599,7 +602,7 @@ class CountedRatings:
         refuse(
             (
                 n_items * width > _MAX_PLACES,
-                f"ratings: needs at most {_MAX_PLACES:.0e} to be laid out item by "
+                f"ratings: needs at most {_MAX_PLACES:.0e} to arrange them item by "
                 f"item, got {n_items} items of up to {width}",
             ),
             error=CountsError,
@@ -710,8 +713,8 @@ def raters_told_apart(
     refuse(
         (
             n_raters * q > _MAX_MARGINS,
-            f"ratings: {n_raters} raters and {q} different grades are too many to "
-            "count how often each rater gave each grade, which this statistic needs",
+            f"ratings: {n_raters} raters and {q} different grades are too many for "
+            "this statistic, which counts how often each rater gave each grade",
         )
     )
     if counted.n_raters in (0, 1, counted.codes.shape[1]):  # unless two others are left
@@ -748,9 +751,9 @@ def refuse_measurements(ratings: CodedRatings | CountedRatings) -> None:
             n_known > _MEASURED * n_ratings
             and not isinstance(ratings.categories[0], str),
             f"ratings: {n_known} different numbers among {n_ratings} ratings are "
-            "measurements, which hardly ever agree without weights: an intraclass "
-            "correlation, such as icc_a1, takes them as they are, and so do "
-            "Krippendorff's alpha with the metric interval and quadratic weights",
+            "measurements, which rarely agree exactly: use an intraclass correlation, "
+            "such as icc_a1, Krippendorff's alpha with the interval metric, or "
+            "quadratic weights",
         ),
         error=RatingsError,
     )
@@ -767,8 +770,8 @@ def pair_table(
     refuse(
         (
             n_categories > _MAX_SIDE,
-            f"ratings: {n_categories} different grades are too many for a table of "
-            "their pairs, which this statistic needs",
+            f"ratings: {n_categories} different grades are too many for this "
+            "statistic, which needs a table of their pairs",
         )
     )
     side = n_categories + 1

@@ -32,10 +32,10 @@ Array = NDArray[Any]
 Resampled = Callable[[Floats, Floats], Floats]
 Why = Callable[[Weights, Floats, Floats], str | None]
 
-ONE_PAIR = "one item with a pair of ratings has no standard error"
+ONE_PAIR = "one item with a pair of ratings gives no standard error"
 NO_SPREAD = (
-    "the standard error is 0: no item moves the estimate, which does not mean that "
-    "there is no uncertainty"
+    "the standard error is 0 because no item changes the estimate; this does not mean "
+    "that there is no uncertainty"
 )
 
 _MANY_GRADES = 128  # up to which numbers are grades, however few are alike

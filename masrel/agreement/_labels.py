@@ -14,13 +14,13 @@ from masrel._input import USUAL_NAMES, listed, refuse, shown, warn_caller
 from masrel.errors import RatingsError, RatingsWarning
 
 Label = str | int | float
-"""What a grade is called: text or a number."""
+"""The name of a grade: text or a number."""
 
 Codes = NDArray[np.signedinteger[Any]]
-"""Codes in the smallest integers that hold them and -(n_categories + 1)."""
+"""Codes in the smallest integer type that holds them and -(n_categories + 1)."""
 
 MISSING = -1
-"""Code of a rating that was not given."""
+"""Code of a missing rating."""
 
 SET_SEPARATOR, EMPTY_SET = "; ", "∅"
 
@@ -58,8 +58,8 @@ def text_of_set(labels: Set[Any]) -> SetText:
     elements = sorted(map(str, labels))
     if any(SET_SEPARATOR.strip() in element for element in elements):
         raise RatingsError(
-            "ratings: labels in a set need to have no semicolon, which separates them, "
-            f"got {elements}"
+            "ratings: labels in a set cannot contain a semicolon, which separates "
+            f"them, got {elements}"
         )
     return SetText(SET_SEPARATOR.join(elements) or EMPTY_SET)
 
@@ -100,7 +100,7 @@ def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
     check_kinds(known, "categories")
     if len(set(known)) < len(known):
         repeated = [label for i, label in enumerate(known) if label in known[:i]]
-        raise RatingsError(f"categories: each label once, repeated: {repeated}")
+        raise RatingsError(f"categories: needs each label once, repeated: {repeated}")
     return known
 
 
@@ -147,8 +147,8 @@ def label_codes(
             if label not in position
         )
         rule = (
-            "needs a label, or None for a missing rating, got ''; it is one where "
-            "categories declare it"
+            "needs a label, or None for a missing rating, got ''; to use '' as a "
+            "label, declare it in categories"
             if declared is None
             else f"needs one of {', '.join(map(repr, known))} or a missing value, got "
             f"{rows[i][j]!r}"
@@ -166,7 +166,7 @@ def warn_of_texts(labels: Sequence[Label], codes: Codes, *, declared: bool) -> N
     ]
     if doubtful:
         warn_caller(
-            "ratings: text that looks like a missing rating counts as a grade: "
+            "ratings: text that looks like a missing rating is counted as a grade: "
             f"{', '.join(doubtful)}; give None for a missing rating, or declare the "
             "text in categories",
             RatingsWarning,

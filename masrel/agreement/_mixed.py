@@ -184,7 +184,7 @@ def components(values: Floats, *, has_raters: bool) -> Components | str:
     df = n_ratings - len(values) - int(rank)
     if df < 1 and centred.any():
         what = "raters" if has_raters else "items"
-        return f"too few ratings to tell {what} from the residual"
+        return f"too few ratings to separate {what} from the residual"
     fit = Components(
         items=0.0,
         raters=0.0,
@@ -201,7 +201,7 @@ def components(values: Floats, *, has_raters: bool) -> Components | str:
         if levels @ laplacian @ levels <= none:
             levels[:] = 0.0
         elif rank < len(levels) - 1:
-            return "no residual, and raters whom no item links"
+            return "there is no residual, and some raters are not linked by any item"
         means = (rated * (centred - levels)).sum(axis=1) / sizes
         of_items, of_raters = float(means.var(ddof=1)), float(levels.var(ddof=1))
         of_items = of_items if of_items > none else 0.0

@@ -28,7 +28,7 @@ WeightName = Literal[
     "circular",
     "bipolar",
 ]
-"""Names of the weights there are."""
+"""Names of the weights."""
 
 MANY = 2000
 """Categories of which a matrix is made; of more, none is."""
@@ -37,10 +37,10 @@ NO_PAIR = "no item has ratings of two raters"
 
 NO_RATIO = "division by 0: ratio weights divide by sums of two values of the scale"
 
-NO_CHANCE = "0/0: chance agreement is 1, all ratings are in one category"
+NO_CHANCE = "0/0: chance agreement is 1, because all ratings are in one category"
 
 NO_CHANCE_BY_WEIGHTS = (
-    "0/0: chance agreement is 1, to the weights all ratings are alike"
+    "0/0: chance agreement is 1, because the weights treat all ratings as the same"
 )
 
 # What irr, psych, vcd, scikit-learn and multiagree call some of them.
@@ -289,8 +289,8 @@ def declared_weights(
         refuse(
             (
                 weights.n_categories != len(categories),
-                f"weights: needs those of {len(categories)} categories, got weights "
-                f'"{weights.name}" of {weights.n_categories}',
+                f"weights: needs weights for {len(categories)} categories, got "
+                f'weights "{weights.name}" of {weights.n_categories}',
             )
         )
         return weights
@@ -302,8 +302,8 @@ def _check_order(categories: Sequence[Label], declared: bool) -> None:
     check_kinds(categories, "categories")
     if not declared and len(categories) > 1 and isinstance(categories[0], str):
         raise ParameterError(
-            "categories: weights need the declared scale in order, the ratings are "
-            f"text: {', '.join(map(str, categories))}"
+            "categories: weights need the declared scale in order, because the "
+            f"ratings are text: {', '.join(map(str, categories))}"
         )
 
 
@@ -336,7 +336,7 @@ def _named(name: str, categories: tuple[Label, ...]) -> Weights:
     n, reason, line = len(categories), None, None
     v: Any = np.full((1, 1), math.nan)  # of a scale that has none
     if n == 1:
-        reason = "0/0: a scale of one category has no weights but identity"
+        reason = "0/0: a scale of one category has only identity weights"
     elif n and name in _LINES:
         x = np.arange(float(n)) if name == "ordinal" else spread_values(categories)
         (linear, square), span = _LINES[name], float(np.ptp(x))
@@ -345,9 +345,9 @@ def _named(name: str, categories: tuple[Label, ...]) -> Weights:
         v = line.matrix() if n <= MANY else line
     elif n > MANY:
         raise ParameterError(
-            f"weights: {name} needs a matrix of every two categories, which is made "
-            f"of at most {MANY}, got {n}; identity, linear, quadratic and ordinal need "
-            "none"
+            f"weights: {name} needs a matrix of all categories, for which there can "
+            f"be at most {MANY}, got {n}; identity, linear, quadratic and ordinal "
+            "need no matrix"
         )
     elif n:
         values = spread_values(categories)
@@ -377,7 +377,7 @@ def category_values(categories: Sequence[Label]) -> Floats:
         return np.array(categories, dtype=np.float64)
     except (OverflowError, TypeError, ValueError) as error:
         raise ParameterError(
-            f"categories: needs numbers that floats hold, got {shown(categories)}"
+            f"categories: needs numbers that fit into floats, got {shown(categories)}"
         ) from error
 
 
@@ -387,7 +387,7 @@ def spread_values(categories: Sequence[Label]) -> Floats:
     span = float(values.max()) - float(values.min()) if len(values) > 1 else 1.0
     if len(set(values.tolist())) < len(values) or not 1e-75 < span < 1e75:
         raise ParameterError(
-            "categories: weights need finite numbers that floats tell apart, with a "
+            "categories: weights need finite numbers that differ as floats, with a "
             f"range of 1e-75 to 1e75, got {shown(categories)}"
         )
     return values

@@ -22,7 +22,7 @@ from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
 Alternative = Literal["two-sided", "greater", "less"]
-"""What a p-value is evidence for: that the true value is other, greater or less."""
+"""The alternative of a test: the true value is different, greater or less."""
 
 BandScale = Literal["landis_koch", "altman", "fleiss", "cicchetti"]
 """Whose words."""
@@ -123,7 +123,7 @@ def p_value(
     if null is None and entry is not None and not entry.chance_corrected:
         raise ParameterError(
             f"null: needs a value for {entry.title}: it is not corrected for chance, "
-            "so that 0 is not what chance gives"
+            "so chance does not give 0"
         )
     if reason is not None:
         undefined(f"p-value of {estimate.coefficient}", reason)

@@ -23,7 +23,7 @@ from masrel.estimates import Significance
 McnemarKind = Literal["exact", "uncorrected", "corrected"]
 """The binomial distribution, or chi-squared without or with continuity correction."""
 
-_SAME_MARGINS = "both ratings have the same margins"
+_SAME_MARGINS = "both raters have the same margins"
 
 
 def contingency_table(
@@ -107,7 +107,10 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
     """
     (a, b), (c, d) = check_two_by_two(table)
     check_option("kind", kind, get_args(McnemarKind))
-    hypothesis, n_items = "changes go both ways alike often", a + b + c + d
+    hypothesis, n_items = (
+        "changes in both directions are equally frequent",
+        a + b + c + d,
+    )
     if kind != "exact":
         shift = max(abs(b - c) - 1, 0) if kind == "corrected" else abs(b - c)
         statistic = shift**2 / (b + c) if b + c else math.nan
@@ -443,7 +446,7 @@ def specific_agreement(table: ArrayLike) -> tuple[float, ...]:
     used = (cells.sum(axis=0) + cells.sum(axis=1)).tolist()
     if not all(used):
         unused = used.index(0) + 1
-        undefined(f"specific agreement on category {unused}", "0/0: nobody used it")
+        undefined(f"specific agreement on category {unused}", "0/0: no rater used it")
     twice = (2 * cells.diagonal()).tolist()
     return tuple(t / n if n else math.nan for t, n in zip(twice, used, strict=True))
 

@@ -204,8 +204,8 @@ def _check(
         ),
         (
             not _may_err(study, fixed),
-            "fixed: needs a facet that is a sample or several ratings of a cell, got "
-            f"{', '.join(fixed)}: no rating would have an error",
+            "fixed: needs a random facet or several ratings of a cell, got "
+            f"{', '.join(fixed)}: otherwise ratings have no error",
         ),
         (not (cut is None or is_number), f"cut: needs a number, got {shown(cut)}"),
     )
@@ -259,8 +259,8 @@ def cheapest_design(
     refuse(
         (
             len(prices) != len(usual) or not all(0.0 <= x < math.inf for x in prices),
-            f"prices: needs {len(usual)} of at least 0 (a level of "
-            f"{', '.join(study.facets)}; a rating), got {shown(prices)}",
+            f"prices: needs {len(usual)} numbers of at least 0 (for a level of "
+            f"{', '.join(study.facets)}, and for a rating), got {shown(prices)}",
         ),
     )
     free = [name for name in study.facets if name not in study.fixed]
@@ -279,8 +279,8 @@ def cheapest_design(
     refuse(
         (
             not (reached >= aim).any(),
-            f"aim: needs at most {reached.max():.3g}, which {most} levels of each "
-            f"facet give, got {shown(aim)}",
+            f"aim: needs at most {reached.max():.3g}, the value with {most} levels of "
+            f"each facet, got {shown(aim)}",
         )
     )
     costs: Any = prices[-1] * study.n_levels[study.of] * math.prod(sizes.values())

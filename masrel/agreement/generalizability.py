@@ -42,7 +42,13 @@ _RESIDUAL = "residual"  # what no effect explains, where cells have several rati
 # Degrees of freedom of the residual below which
 # docs/reference/coefficients/generalizability.md has intervals that hold the truth less
 # often than they say
-_FEW, _FEW_RATINGS = 10, "few ratings: intervals may hold the truth less often"
+_FEW, _FEW_RATINGS = (
+    10,
+    (
+        "there are few ratings: the true coverage of the intervals may be below their "
+        "level"
+    ),
+)
 _MOST_DENSE = 5000  # levels of the effects that are not of the largest column
 
 _METHODS = {
@@ -294,9 +300,9 @@ def g_study(
     squares, df = balanced or (np.empty(0), np.empty(0))
     components = dict(zip(effects, (unit**2 * parts).tolist(), strict=True))
     notes += [
-        f"{source} is negative ({part:.3g}): taken for 0 in reliability"
+        f"{source} is negative ({part:.3g}) and treated as 0 in reliability"
         if part < 0.0
-        else f"{source} is 0, the least that REML gives"
+        else f"{source} is 0, the lowest value that REML gives"
         for source, part in components.items()
         if part < 0.0 or (part == 0.0 and method == "REML")
     ]
@@ -343,9 +349,9 @@ def _fit(
     start = moments(values, cells)
     largest = max(codes, key=lambda name: int(codes[name].max()))
     others = [cell.max() + 1 for effect, cell in cells.items() if largest not in effect]
-    why = f"{sum(others)} levels beside those of {largest} are too many for REML"
+    why = f"{sum(others)} levels besides those of {largest} are too many for REML"
     if sum(others) <= _MOST_DENSE:
-        why = "effects leave no residual, so that REML has no maximum"
+        why = "the effects leave no residual, so REML has no maximum"
     if sum(others) <= _MOST_DENSE and values.any():
         from masrel.agreement._reml import components  # with scipy
 
@@ -372,7 +378,7 @@ def _check_design(
     refuse(
         (
             not is_few or len({*columns}) < len(columns),
-            f"facets: need one to 3 columns beside {of!r}, got {shown(facets)}",
+            f"facets: need one to 3 columns besides {of!r}, got {shown(facets)}",
         ),
         (
             strange,
@@ -381,7 +387,7 @@ def _check_design(
         ),
         (
             any(name in nested for name in above),
-            f"nested: needs facets within others, got {shown(nested)}, a circle",
+            f"nested: needs facets within others, got a circle, {shown(nested)}",
         ),
     )
 
@@ -399,8 +405,8 @@ def _read(
         refuse(
             (
                 len(names) < 2,
-                f"ratings: column {name!r} needs two levels or more, got "
-                f"{names[0]} alone: what never varies has no variance",
+                f"ratings: column {name!r} needs two levels or more, got {names[0]} "
+                "only, which has no variance",
             ),
             error=RatingsError,
         )
@@ -426,9 +432,9 @@ def _cells(
     refuse(
         (
             together,
-            f"ratings: {' and '.join(together)} need to be told apart, but the same "
-            "ratings share a level of each; what has levels of its own in each level "
-            "of another is nested",
+            f"ratings: {' and '.join(together)} cannot be separated, because the same "
+            "ratings share a level of each; name a facet as nested if each level of "
+            "another has its own levels of it",
         ),
         error=RatingsError,
     )

@@ -63,11 +63,11 @@ _ICC_ALIASES: dict[IccForm, tuple[str, ...]] = {
 
 _ROUNDING = 1e-13  # share of the sum of all squares that is none
 
-_ALL_ALIKE = "0/0: neither items nor ratings of an item differ"
+_ALL_ALIKE = "0/0: there are no differences between items or within them"
 
 _OUTSIDE = (
-    "the value takes a variance as less than 0; the profile likelihood takes none so, "
-    "and its interval is drawn out to the value"
+    "a variance is estimated as less than 0, which the profile likelihood does not "
+    "allow; its interval is extended to the value"
 )
 
 # Value, interval and why there is none
@@ -196,8 +196,8 @@ def icc(
         value, confidence, reason = _without_gaps(values, form, level, interval)
     elif interval == "F":
         raise ParameterError(
-            'interval: "F" needs every rating, and some are missing; "auto" needs none '
-            "of them, or leave out the items without"
+            'interval: "F" needs every rating, but some are missing; use "auto", '
+            "or leave out the items with missing ratings"
         )
     else:
         value, confidence, reason = _with_gaps(values, form, level)
@@ -412,10 +412,12 @@ def robinson_a(
     if min(values.shape) < 2:
         reason = undefined(
             "Robinson's A",
-            "fewer than two items or raters in the items that every rater rated",
+            "the items that every rater rated have fewer than two items or raters",
         )
     elif (total := anova.items + (anova.k - 1) * anova.residual) == 0.0:
-        reason = undefined("Robinson's A", "0/0: no variance but between raters")
+        reason = undefined(
+            "Robinson's A", "0/0: there is no variance except between raters"
+        )
     else:
         value = anova.items / total  # squares over (n - 1)
     return measured(
@@ -620,9 +622,10 @@ def _features(
     refuse(
         (
             (some & ~rated.all(axis=1)).any(),
-            "ratings: an ICC with items left out, drawn, or in clusters needs every "
-            "rating, and some are missing: leave out the items that not every rater "
-            "rated; without clusters its own interval takes all ratings there are",
+            "ratings: for an ICC with items left out, drawn, or in clusters every "
+            "rating is needed, but some are missing: leave out the items that not "
+            "every rater rated; without clusters the ICC's own interval uses all "
+            "ratings",
         ),
         error=RatingsError,
     )
@@ -772,7 +775,7 @@ def _with_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Ans
         return math.nan, None, undefined(form, _ALL_ALIKE)
     k = fit.n_raters if form.endswith("k)") else 1
     note = (
-        f"k is the {k} raters of the table; an item has "
+        f"the mean is of k = {k} ratings, one per rater; an item has "
         f"{fit.n_ratings / fit.n_items:.3g} ratings on average"
     )
     low, high = fit.icc_ends(absolute=absolute, level=level)
@@ -820,7 +823,7 @@ def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, float, str | 
     if ties:
         denominator -= m * sum(t**3 - t for _, freq in columns for t in freq.tolist())
     if denominator == 0:
-        why = "0/0: every rater gives all items one rating"
+        why = "0/0: every rater gives all items the same rating"
         return math.nan, math.nan, undefined("Kendall's W", why)
     w = 3 * sum(s**2 for s in sums.tolist()) / denominator
 

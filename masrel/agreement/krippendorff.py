@@ -38,7 +38,7 @@ from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
 Metric = Literal["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
-"""Names of the difference functions; the last two are of sets of labels."""
+"""Names of the difference functions; the last two are for sets of labels."""
 
 _MARKS = (";", "|")  # between labels in text; that of sets is the first
 # Text or a number in a list or set as Python and JSON write them.
@@ -212,8 +212,9 @@ def krippendorff_alpha(
             (
                 n_rows < n_columns,
                 f"level_of_measurement: {n_rows} rows and {n_columns} columns may be "
-                "raters by items, as the krippendorff package takes them: rows are "
-                "items here, so turn the table, or say metric if it is as it should be",
+                "raters by items, as the krippendorff package takes them, but here "
+                "rows are items: transpose the table, or use metric if it is right as "
+                "it is",
             )
         )
     made = weights if metric is None else _metric_weights(metric, counted)
@@ -236,8 +237,8 @@ def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
         return Weights(name=metric, n_categories=n, v=_of_sets(metric, categories))
     if not counted.declared and isinstance(categories[0], str):
         raise ParameterError(
-            f"categories: the {metric} metric needs the declared scale in order, the "
-            f"ratings are text: {', '.join(map(str, categories))}"
+            f"categories: the {metric} metric needs the declared scale in order, "
+            f"because the ratings are text: {', '.join(map(str, categories))}"
         )
     if metric == "ratio":
         return Weights(name="ratio metric", n_categories=n, v=_ratio(categories))
@@ -255,8 +256,8 @@ def _ratio(categories: Sequence[Label]) -> Floats:
     refuse(
         (
             len(values) > MANY,
-            "metric: ratio needs a matrix of every two categories, which is made of at "
-            f"most {MANY}, got {len(values)}; interval needs none",
+            "metric: ratio needs a matrix of all categories, for which there can be "
+            f"at most {MANY}, got {len(values)}; interval needs no matrix",
         ),
         (
             sums_to_zero(values),
@@ -295,11 +296,10 @@ def _mark_between(metric: str, categories: Sequence[Label]) -> str:
         marks.add(_MARKS[0])
     if n_lists or len(texts) < len(plain) or len(marks) != 1:
         raise ParameterError(
-            f"metric: {metric} needs sets of labels, or text that holds several in one "
-            "of these ways, x;y or x|y or ['x', 'y'] (--set-separator says what else "
-            "stands between labels of a file), got "
-            f"{', '.join(map(shown, plain[:3]))}; where each is one label, the nominal "
-            "metric is the same"
+            f"metric: {metric} needs sets of labels, or text that holds several in "
+            "one of these ways, x;y or x|y or ['x', 'y'] (for a file, --set-separator "
+            f"names another separator), got {', '.join(map(shown, plain[:3]))}; if "
+            "each has only one label, the nominal metric gives the same value"
         )
     return marks.pop()
 

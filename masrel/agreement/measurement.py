@@ -32,10 +32,10 @@ from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval
 
 _VarianceParts = list[tuple[float, float]]
-"""What adds up to a variance, each part with its degrees of freedom."""
+"""The parts of a variance, each with its degrees of freedom."""
 
 ErrorKind = Literal["agreement", "consistency"]
-"""Whether what raters differ by on average is error, or not."""
+"""Whether average differences between raters count as error."""
 
 # From the error of one rating to the change of two that chance exceeds in 5 %
 _CHANGE = 1.96 * math.sqrt(2.0)
@@ -256,7 +256,7 @@ def _variance_ends(
         shrink = 1.0 - df / float(chdtri(df, 0.5 - 0.5 * level))
         stretch = df / float(chdtri(df, 0.5 + 0.5 * level)) - 1.0
         if shrink < 0.0 or stretch < 0.0:  # the mean of χ² is beyond its quantile
-            why = "the level is too low: the ends would leave the estimate out"
+            why = "the level is too low: the interval would not contain the estimate"
             return math.nan, math.nan, why
         down += (shrink * square) ** 2
         up += (stretch * square) ** 2
@@ -384,7 +384,8 @@ def limits_of_agreement(
     reason, widths = None, [math.nan] * 5
     if n < 2:
         reason = undefined(
-            "the limits of agreement", "fewer than two items are rated by both raters"
+            "an estimate of limits of agreement",
+            "fewer than two items are rated by both raters",
         )
     else:
         mean, sd = float(differences.mean()), float(differences.std(ddof=1))
@@ -600,7 +601,10 @@ def _interval(
             limit = np.nextafter(1.0, 0.0)  # without an item all may be perfect
             each = np.arctanh(np.clip(without, -limit, limit))
             if np.isnan(each).any():
-                reason = "undefined with one item left out: all ratings are the same"
+                reason = (
+                    "it is undefined with one item left out, because all ratings are "
+                    "then the same"
+                )
             width = student_t(level, n - 1) * math.sqrt((n - 1) * float(each.var()))
         low, high = math.tanh(z - width), math.tanh(z + width)
     return Interval(

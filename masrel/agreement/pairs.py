@@ -305,7 +305,7 @@ def _why_no_mean(
             return f"no item has both ratings {of_pair}"
         if d_e == 0.0:
             if weights.tells_apart:
-                return f"0/0: one category is all {of_pair}"
+                return f"0/0: there is only one category {of_pair}"
             return weights.no_chance
     return None
 

@@ -74,7 +74,7 @@ Property = Literal[
     "two categories",
     "perfect agreement",
 ]
-"""What may be true of a coefficient; each has a test that all that claim it pass.
+"""Properties of coefficients; each has a test for all coefficients that claim it.
 
 An unused category, or every item twice, changes nothing; the order of categories does
 not matter with identity weights; linear and quadratic weights of two categories are
@@ -197,7 +197,7 @@ class Coefficient:
         refuse(
             (
                 self.name != "krippendorff_alpha",
-                f"metric: is of krippendorff_alpha alone, got {metric!r} for "
+                f"metric: is only for krippendorff_alpha, got {metric!r} for "
                 f"{self.name}; other coefficients take weights",
             )
         )
@@ -227,7 +227,7 @@ class Coefficient:
         return Weights(name="identity", n_categories=n, v=v)
 
     def _refuse_weights(self, weights: "WeightsLike") -> None:
-        takes_none = f"weights: {self.title} takes none, got {shown(weights)}"
+        takes_none = f"weights: {self.title} takes no weights, got {shown(weights)}"
         refuse((not is_identity(weights), takes_none))
 
 

@@ -222,7 +222,7 @@ def limits_with_repeats(
     n, is_line = len(differences), kind == "proportional"
     reason = flat if is_line or n < 2 else None
     if reason is not None:
-        undefined("the limits of agreement", reason)
+        undefined("an estimate of limits of agreement", reason)
     # what is left of differences without the line, where there is one
     lean, df = (slope, n - 2.0) if is_line else (0.0, n - 1.0)
     residuals = differences - lean * averages
@@ -274,7 +274,7 @@ def _values(data: Any, name: str, kind: _LimitsKind) -> Floats:
         (
             is_wrong.any(),
             f"ratings: row {is_wrong.argmax()}, column {name!r}: needs a number above "
-            f"0, of which there are ratios, got {values[is_wrong.argmax()]:g}",
+            f"0 for ratios, got {values[is_wrong.argmax()]:g}",
         ),
         error=RatingsError,
     )
@@ -292,8 +292,8 @@ def _cautions(
         return ()
     return (
         _Caution(
-            "numbers of repeats differ much from item to item: it may hold the limit "
-            "less often than it says"
+            "the number of repeats varies a lot between items: the true coverage may "
+            "be below the level of the interval"
         ),
     )
 
@@ -308,9 +308,9 @@ def _slope(averages: Floats, differences: Floats) -> tuple[float, float, str | N
     if n < 3:
         reason = f"fewer than {max(n + 1, 2)} items were measured by both methods"
     elif sum_of_squares <= _ROUNDING**2 * float(averages @ averages):
-        reason = "the mean of both methods is the same of all items"
+        reason = "the mean of both methods is the same for all items"
     elif rest.min() < _ROUNDING:
-        reason = "one item alone decides on the slope"
+        reason = "the slope depends on a single item"
     if reason is not None:
         return math.nan, math.nan, reason
     slope = float(off @ differences) / sum_of_squares
@@ -636,7 +636,12 @@ def _of_observers(results: list[Any], level: float) -> Any:
 def _of_pairs(results: list[Any], level: float) -> Any:
     """Return limits of two methods, by those of all rows and without each cluster."""
     limits: RepeatedLimits = results[0]
-    refuse((limits.kind == "proportional", "measure: needs limits that follow no line"))
+    refuse(
+        (
+            limits.kind == "proportional",
+            ("measure: needs limits that do not follow a line"),
+        )
+    )
     is_ratio = limits.kind == "ratio"
     rows = [
         [_log(of.bias) if is_ratio else of.bias, _log(of.sd), of.slope]
@@ -678,7 +683,7 @@ def _left_out(rows: list[list[float]], level: float) -> list[Interval]:
         unit="clusters",
         units_are="left out",
     )
-    why = "with one of the clusters left out it is undefined"
+    why = "it is undefined when one of the clusters is left out"
     return [
         _around(
             *(ends, value, error, n - 1, "cluster jackknife, "),

@@ -31,7 +31,7 @@ SpanMatch = Literal["strict", "overlap", "token"]
 """When spans of two observers match."""
 
 _MOST = 2**31  # beyond which squares of lengths leave 64 bits
-_NO_ENDS = "leaving out a document leaves the value as it is, or leaves none"
+_NO_ENDS = "leaving out a document leaves the value unchanged or undefined"
 _FIELDS = ("document", "observer", "category", "begin", "length")
 
 
@@ -331,7 +331,10 @@ def _laid(
     _check_spans(
         [*names, starts, sizes],
         (np.flatnonzero(outside)[:1], "to end after they begin, within the document"),
-        (order[[*crosses, *crosses + 1]], "of an observer and a category to lie apart"),
+        (
+            order[[*crosses, *crosses + 1]],
+            ("of the same observer and category not to overlap"),
+        ),
     )
     is_there &= is_there.sum(axis=0) > 1
     refuse(

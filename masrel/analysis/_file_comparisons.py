@@ -112,7 +112,7 @@ def _difference_rows(
     refuse(
         (
             len(file.parts) < 2,
-            "--by: needs a column that tells two groups or more apart, "
+            "--by: needs a column with two groups or more, "
             + ("or --by-criterion" if by is None else f"{by!r} has one"),
         )
     )

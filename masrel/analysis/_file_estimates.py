@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 _Ratings = TypeVar("_Ratings", bound="CodedRatings | CountedRatings")
 
 USUAL = ("percent_agreement", "fleiss_kappa")
-"""The coefficients that are estimated where none are named."""
+"""The coefficients that are estimated by default."""
 
 OF_MEASUREMENTS = ("icc_a1", "lin_ccc")
-"""Those beside limits of agreement, whose grades are measurements."""
+"""The coefficients shown beside limits of agreement, which are for measurements."""
 
 # The coefficient that has metrics, and those of each rater's grades of two sessions
 _OF_METRIC = "krippendorff_alpha"
@@ -185,35 +185,35 @@ class Questions(Estimating):
             *(
                 (
                     other in _TABLES,
-                    f"--coefficients: needed coefficients, got {name!r}: "
-                    f"{_TABLES.get(other)} has that table",
+                    f"--coefficients: needed names of coefficients, got {name!r}; "
+                    f"{_TABLES.get(other)} makes that table",
                 )
                 for name, other in others.items()
             ),
             (
                 clusters is not None and tables,
-                f"--clusters: --{''.join(tables[:1])} takes every item by itself, so "
-                "needs one of them, got both",
+                f"--clusters: --{''.join(tables[:1])} treats items as independent: "
+                "needed one of them, got both",
             ),
             (
                 clusters is not None and of_raters,
-                "--clusters: what is left out is a cluster of items, so it takes "
-                f"--target items, got --target {self.target}",
+                "--clusters: clusters are of items, so it needs --target items, got "
+                f"--target {self.target}",
             ),
             (
                 self.convention is not None and of_raters,
-                "--convention: the errors that programs print take items as the "
-                f"sample, so it takes --target items, got --target {self.target}",
+                "--convention: the errors that programs print are for other items, so "
+                f"it needs --target items, got --target {self.target}",
             ),
             (
                 self.convention is not None and clusters is not None,
-                "--convention: these errors know of no clusters, so it takes no "
-                "--clusters",
+                "--convention: these errors ignore clusters, so it cannot be combined "
+                "with --clusters",
             ),
             (
                 self.convention is not None and self.interval != "auto",
-                "--convention: it is a kind of interval, so it takes no --interval, "
-                f"got {self.interval}",
+                "--convention: it is itself a kind of interval, so it cannot be "
+                f"combined with --interval, got {self.interval}",
             ),
         )
         of_items = clusters is not None or self.convention is not None
@@ -297,115 +297,126 @@ class Explanation(str):
 
 # Notes that stand below a table at once
 _TEXTS = {
-    "constant": "Repeats: {n} measurements in all; an item has one true value.",
-    "varying": "Repeats: {n} measurements in pairs; the true value of an item may move "
-    "from one pair to the next.",
+    "constant": "Repeats: {n} measurements in all; each item has one true value.",
+    "varying": "Repeats: {n} measurements in pairs; the true value of an item may "
+    "change from one pair to the next.",
     "left_out": "{group}Left out: {names}.",
     "pair": "Difference: {pair}.",
-    "reference": "{rater} is the reference, and in no other estimate between raters.",
-    "least": "The {n} pairs that agree least; --json has {n_all}.",
+    "reference": "{rater} is the reference and is not included in the other estimates "
+    "between raters.",
+    "least": "Shown are the {n} pairs that agree least; --json has all {n_all}.",
     "roles": "Judges: {judges}. Humans: {humans}.",
-    "closer": "Closer: of human and judge to the other humans, item by item. Shares: "
-    "of items on which one is closer or as close.",
-    "no_ends": "No intervals: --target items has them.",
-    "shared_clusters": "Groups have clusters in common, which are left out of both at "
-    "once.",
-    "shared_items": "Items the same: both groups have items of the same names, taken "
-    "for the same items, and an item is left out of both at once.",
-    "same_names": "{first} and {second}: {n} items have the same name, taken for "
-    "different items.",
-    "without": "Left out: {titles}: there is no such interval.",
+    "closer": "Closer: number of items on which the human, or the judge, is closer to "
+    "the other humans. Shares: items on which one is closer or as close.",
+    "no_ends": "No intervals were asked for; add --target items.",
+    "shared_clusters": "The groups share clusters; a shared cluster is left out of "
+    "both groups at once.",
+    "shared_items": "Same items: both groups have items with the same names. These "
+    "are treated as the same items, and an item is left out of both groups at once.",
+    "same_names": "{first} and {second}: {n} items have the same name but are treated "
+    "as different items.",
+    "without": "Left out: {titles}, for which this interval is not available.",
 }
 
 # Notes on how numbers were made
 _EXPLANATIONS = {
     # test and retest
-    "sessions": "{group}Each rater's grades of {first} and of {second}.",
+    "sessions": "{group}Each rater's grades in {first} are compared with "
+    "those in {second}.",
     # two raters
     "test": "{test}: whether {hypothesis}.",
-    "exact_test": "{test}: whether {hypothesis}; df: the items that changed.",
-    "pabak": "PABAK: 2 p_o − 1, which is Brennan-Prediger's coefficient of two "
-    "categories; SE: delta method, items as the sample.",
-    "on_category": "Agreement on a category: how often, where one rater chose it, the "
-    "other chose it too; of two categories negative and positive agreement.",
-    "largest": "Largest κ: what the margins of the raters allow.",
-    "limits": "Limits: mean ∓ 1.96 standard deviations, between which 95 % of "
-    "differences lie if they are normal.",
+    "exact_test": "{test}: whether {hypothesis}; df: the number of items that changed.",
+    "pabak": "PABAK: 2 p_o − 1, which is Brennan-Prediger's coefficient for two "
+    "categories; SE by the delta method, with items as the sample.",
+    "on_category": "Agreement on a category: how often one rater chose it when the "
+    "other did; with two categories these are negative and positive agreement.",
+    "largest": "Largest κ: the largest value that the raters' margins allow.",
+    "limits": "Limits: mean ∓ 1.96 standard deviations. If differences are normal, 95 "
+    "% lie between them.",
     **{
-        f"limits_{kind}": f"Limits: {middle} ∓ 1.96 standard deviations of the "
-        "difference of two single measurements, between which 95 % lie if they are "
-        "normal."
+        f"limits_{kind}": (
+            f"Limits: {middle} ∓ 1.96 standard deviations of the difference between "
+            "two single measurements. If differences are normal, 95 % lie between "
+            "them."
+        )
         for kind, middle in (
             ("with_repeats", "mean"),
             ("that_follow", "line"),
             ("of_ratios", "mean of logarithms"),
         )
     },
-    "mover_ends": "{level} % CI: of the mean t, of the slope t with HC3 errors, of "
-    "limits MOVER; for other items like these, measured by the same raters.",
+    "mover_ends": "{level} % CI: t for the mean, t with HC3 errors for the slope, "
+    "MOVER for the limits; for other items like these, measured by the same raters.",
     "cluster_ends": "{level} % CI: leaving out one cluster at a time, with Student's "
     "t; for other clusters like these, measured by the same raters.",
     "limits_with_mean": "Limit: 1.96 √((k − 1)/k) SEM on either side of the mean of "
     "all k raters. MDC95: 1.96 √2 SEM.",
     "mean_ends": "{level} % CI: modified large sample; for other items and raters.",
-    "exact_ends": "{level} % CI: exact (t, noncentral t), each for itself; "
-    "both: for the two limits together, factors of tolerance; for other items like "
-    "these, rated by the same raters.",
+    "exact_ends": "{level} % CI: exact (t, noncentral t), separately for each number. "
+    "Both: tolerance factors for the two limits together. They generalise to other "
+    "items like these, rated by the same raters.",
     # diagnosis
-    "change": "Change: of all without the rater, less that of all: above 0 the others "
-    "agree better without.",
+    "change": "Change: agreement without the rater minus agreement of all raters. If "
+    "it is above 0, the others agree better without the rater.",
     "standard_error": "SE: item jackknife.",
-    "agreement": "Agreement: how often, where one rater chose the category, another "
-    "rater of the item chose it too.",
-    "raters_ends": "{level} % CI: t, each by itself. They generalise to other items, "
-    "rated by these raters.",
-    "pairs_ends": "{level} % CI: that of {title} of the two raters alone. They "
+    "agreement": "Agreement: how often another rater of the same item also chose a "
+    "category that one rater chose.",
+    "raters_ends": "{level} % CI: Student's t, separately for each rater. They "
+    "generalise to other items, rated by these raters.",
+    "pairs_ends": "{level} % CI: as for {title} of these two raters alone. They "
     "generalise to other items, rated by these raters.",
     "categories_ends": "{level} % CI: exact at the effective number of items. They "
     "generalise to other items, rated by these raters.",
-    "confusion": "The columns: which share of these times the rater said so.",
+    "confusion": "Columns: the share of these times in which the rater gave that "
+    "grade.",
     "confusion_ends": "Intervals are in --json: exact at the effective number of "
     "items.",
     # judges
-    "advantage": "Advantage: how often the judge is as close to the other humans as a "
-    "human is, or closer; mean over humans. Not worse: humans better by less than ε.",
-    "worse": "p: of the human being better by ε or more; {tests}. Not worse: at "
-    "{level} % for all humans of a judge, by Benjamini and Yekutieli.",
-    "right": "Alone right: one of the two has the grade of {reference}, the other has "
-    "not. p: of the judge being right less often by {epsilon:g} or more.",
-    "judge_difference": "Difference: advantage of the first less that of the second on "
-    "the same items; {level} % CI and p by the jackknife; p (Holm): adjusted for all "
-    "pairs.",
-    "classes": "Which share of the items of a class the rater gave each grade; right, "
-    "low and high: {level} % credible interval of that of the class itself.",
-    "worth": "How many raters who err each by themselves these are worth, by the "
-    "correlation of their errors against the reference; {level} % CI: item jackknife.",
+    "advantage": "Advantage: how often the judge is at least as close to the other "
+    "humans as a human is, averaged over humans. Not worse: number of humans who are "
+    "better by less than ε.",
+    "worse": "p: tests whether the human is better by ε or more; {tests}. Not worse: "
+    "at {level} % over all humans for each judge (Benjamini and Yekutieli).",
+    "right": "Alone right: one of the two gives the grade of {reference} and the "
+    "other does not. p: tests whether the judge is right less often by {epsilon:g} or "
+    "more.",
+    "judge_difference": "Difference: the first judge's advantage minus the second's "
+    "on the same items; {level} % CI and p by the jackknife; p (Holm): adjusted for "
+    "all pairs.",
+    "classes": "Share of the items of a class to which the rater gave each grade. "
+    "Right, low and high: {level} % credible interval of the share that got the grade "
+    "of the class.",
+    "worth": "The number of raters with independent errors that would be as "
+    "informative, from the correlation of their errors against the reference; {level} "
+    "% CI: item jackknife.",
     "labels": "Labels: {labels}. {level} % CI.",
-    "position": "First gains: share of pairs that go to whichever answer is shown "
-    "first, less that of those which go to the second; {level} % CI by Tango, p by "
-    "McNemar's exact test. Same: share of pairs with one verdict in both orders, a tie "
-    "being one; without: of pairs without a tie.{ties}",
-    "strengths": "Strength: logarithm of the odds against an average answer "
-    "(Bradley-Terry); a tie is half a win. {level} % CI: variance by items, Student's "
-    "t.",
+    "position": "First gains: share of pairs won by the answer shown first minus the "
+    "share won by the one shown second; {level} % CI by Tango's method, p by "
+    "McNemar's exact test. Same: share of pairs with the same verdict in both orders, "
+    "where a tie is a verdict. Without ties: the same for pairs without a tie.{ties}",
+    "strengths": "Strength: log odds of winning against an average answer "
+    "(Bradley-Terry); a tie counts as half a win. {level} % CI: variance between "
+    "items, Student's t.",
     # comparisons
     **{
-        f"difference_of_{units}": "Difference: the first less the second. SE, {level} "
-        f"% CI and p: {unit} jackknife, t; they generalise to other {population} like "
-        "these, graded by the same raters; raters are taken as they are, whether "
-        "groups share them or not."
+        f"difference_of_{units}": (
+            f"Difference: the first minus the second. SE, {{level}} % CI and p: "
+            f"{unit} jackknife, Student's t. They generalise to other {population} "
+            "like these, graded by the same raters, whether or not the groups share "
+            "raters."
+        )
         for units, unit, population in (
             ("items", "item", "items"),
             ("clusters", "cluster", "clusters of items"),
         )
     },
-    "holm": "p (Holm): adjusted for {n} pairs, each coefficient by itself.",
-    "Fleiss' weighted χ²": "Fleiss' weighted χ²: groups of other items, by their "
-    "delta-method errors.",
-    "Donner's goodness of fit": "Donner's goodness of fit: two raters and two "
-    "categories, of one κ of all groups; it holds its level in smaller groups.",
-    "Hotelling's T² as F": "Hotelling's T² as F: groups of the same items, by their "
-    "names, or of the same clusters, by the delta method.",
+    "holm": "p (Holm): adjusted for {n} pairs, separately for each coefficient.",
+    "Fleiss' weighted χ²": "Fleiss' weighted χ²: for groups with different items, by "
+    "their delta-method errors.",
+    "Donner's goodness of fit": "Donner's goodness of fit: for two raters and two "
+    "categories, with a κ common to all groups; it keeps its level in smaller groups.",
+    "Hotelling's T² as F": "Hotelling's T² as F: for groups with the same items (by "
+    "name) or the same clusters, by the delta method.",
 }
 
 
@@ -491,7 +502,7 @@ def entries(
     refuse(
         (
             questions.metric and is_of_others,
-            f"--metric {questions.metric}: is of {_OF_METRIC}, which is not among "
+            f"--metric {questions.metric}: is for {_OF_METRIC}, which is not among "
             f"--coefficients {','.join(questions.names)}",
         )
     )
@@ -517,8 +528,8 @@ def entries(
         refuse(
             (
                 entry.shape == "pairs",
-                f"--coefficients: {entry.name} takes each rater's grades of two "
-                "sessions: --session COL --retest computes it",
+                f"--coefficients: {entry.name} needs each rater's grades of two "
+                "sessions: add --session COL --retest",
             )
         )
         if entry.needs_order:
@@ -532,7 +543,7 @@ def check_order(file: "RatingsFile", what: str) -> None:
         (
             not file.is_ordered,
             f"{what}: needs grades that are numbers or --categories with every grade "
-            f"in order, the grades met are text: {listed(file.scale.grades)}",
+            f"in order, the grades found are text: {listed(file.scale.grades)}",
         )
     )
 
@@ -563,9 +574,9 @@ def estimate_row(
     notes = []
     if questions.weights != questions.weights_of(entry) and not questions.takes_all:
         notes.append(
-            f"by its metric, without {questions.weights} weights"
+            f"computed with its metric, not with {questions.weights} weights"
             if entry.metric
-            else "unweighted, there are no weights for it"
+            else "unweighted, because it has no weighted form"
         )
     try:
         estimate = _estimate(entry, ratings, questions, questions.level)

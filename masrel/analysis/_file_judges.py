@@ -48,8 +48,8 @@ _Grades = dict[str, Any]  # by item
 
 _MARGIN = (
     "--epsilon, --annotators: needed one of them: ε is how much worse than a human a "
-    "judge may be, as it costs less; --annotators expert takes 0.2, skilled 0.15 and "
-    "crowd 0.1"
+    "judge may be because it costs less; --annotators sets it to 0.2 (expert), 0.15 "
+    "(skilled) or 0.1 (crowd)"
 )
 
 
@@ -178,7 +178,8 @@ def _roles(
     refuse(
         (
             twice,
-            f"{', '.join(named)}: needed others each, got {listed(twice)} twice",
+            f"{', '.join(named)}: needed a different rater for each, got "
+            f"{listed(twice)} twice",
         ),
         (
             not (judges or judging.truth),
@@ -193,13 +194,14 @@ def _roles(
         refuse(
             (
                 called_gold(name),
-                f"--humans: {name!r} reads like a gold standard, which is no human: "
-                f"--reference {name} holds it apart; if it is one, --humans names all",
+                f"--humans: {name!r} looks like a gold standard, not a human: "
+                f"--reference {name} uses it as the reference; if it is a human, list "
+                "all humans with --humans",
             ),
             (
                 called_model(name),
-                f"--humans: {name!r} reads like a model, which is no human: --judge "
-                f"{name} judges it, too; --humans names all who are humans",
+                f"--humans: {name!r} looks like a model, not a human: --judge {name} "
+                "tests it as a judge; if it is a human, list all humans with --humans",
             ),
         )
     return judges, humans
@@ -223,8 +225,8 @@ def _beside_humans(part: _Part) -> _Made:
     refuse(
         (
             len(part.humans) < 2,
-            "--judge: needs two humans, each of whom is held against the others with "
-            f"and without the judge, got {listed(part.humans) or 'none'}; one is "
+            "--judge: needs two humans, because each human and the judge are compared "
+            f"with the other humans, got {listed(part.humans) or 'none'}; one is "
             "enough with --reference",
         )
     )
@@ -372,12 +374,14 @@ _METHODS = {
 }
 _ASSUMED = {
     "judge_is_right": "the judge makes no errors",
-    "errors_carry_over": "it errs elsewhere as often as on labelled items",
-    "labels_are_random": "labelled items are drawn at random",
+    "errors_carry_over": "its error rates are the same on all items",
+    "labels_are_random": "labelled items were drawn at random",
 }
 _RATE_NOTES = {
-    "few_labels": "few labels: the interval may cover less than it says",
-    "whole_range": "the interval is all of 0 to 1: nothing was learnt",
+    "few_labels": "there are few labels: the true coverage may be below the level of "
+    "the interval",
+    "whole_range": "the interval is the whole range from 0 to 1, so the labels show "
+    "nothing",
 }
 
 
@@ -388,8 +392,8 @@ def _rates(part: _Part) -> _Made:
     refuse(
         (
             len(labels) != 1,
-            "--rate: needs --reference with the rater who has the labels, or one "
-            f"human, got {listed(labels) or 'none'}",
+            "--rate: needs --reference with the rater whose grades are the labels, or "
+            f"exactly one human, got {listed(labels) or 'none'}",
         ),
         (
             grade not in part.file.scale.grades,
@@ -516,7 +520,7 @@ def _effective_number(part: _Part, raters: Sequence[str]) -> _Made:
 _TESTS = {
     "exact": "exact and unconditional",
     "score": "Tango's score test",
-    "t": "Student's t, which rejects too often where few items differ",
+    "t": "Student's t, which rejects too often if few items differ",
     "clusters": "Tango's score test with the design effect of clusters",
 }
 

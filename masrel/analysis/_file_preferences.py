@@ -99,8 +99,8 @@ def _verdicts(file: RatingsFile) -> tuple[dict[str, list[_Verdict]], str]:
     refuse(
         (
             len(other) > 1,
-            "--order: needs the answer shown first in it, as --grade has the one "
-            f"preferred or a tie, but none of {listed(other)} is ever shown first",
+            "--order: needs the answer that was shown first, as --grade has the "
+            f"preferred answer or a tie, but {listed(other)} are never shown first",
         )
     )
     tie = other[0] if other else ""
@@ -122,7 +122,7 @@ def _verdicts(file: RatingsFile) -> tuple[dict[str, list[_Verdict]], str]:
         if len(pair) > 2:
             raise RatingsError(
                 f"{file.read['file']}: item {item!r} compares {listed(pair)}: --item "
-                "needs columns that tell pairs apart, too"
+                "also needs the columns that identify the pair"
             )
         for second in pair.keys() - {first}:  # none is known of some in one order
             verdicts.setdefault(rater, []).append((item, first, second, grade))

@@ -77,7 +77,7 @@ _SHOWN_PAIRS = 20  # of these pairs
 
 
 Question = Callable[[RatingsFile, Questions], Iterator[Answer]]
-"""What answers a question about a file."""
+"""A function that answers a question about a file."""
 
 
 def answers(
@@ -93,17 +93,17 @@ def answers(
     refuse(
         (
             len(sessions) > 1 and not questions.retest,
-            f"{file.read['file']}: holds {len(sessions)} sessions "
-            f"({', '.join(sessions)}), so that raters graded the same item more than "
-            f"once; --by {file.read['session']} estimates each"
-            f"{of_command.get(questions.command, '')}",
+            f"{file.read['file']}: has {len(sessions)} sessions "
+            f"({', '.join(sessions)}), so raters graded the same item more than once; "
+            f"--by {file.read['session']} estimates "
+            f"each{of_command.get(questions.command, '')}",
         ),
         error=RatingsError,
     )
     refuse(
         (
             file.read["repeated"] == "each" and questions.truth is None,
-            "--repeated each: is for masrel limits --truth alone",
+            "--repeated each: works only with masrel limits --truth",
         )
     )
     if questions.weights != "identity" and not isinstance(questions.weights, Weights):
@@ -195,12 +195,13 @@ def _retest(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
         ),
         (
             file.parts[0].session is None,
-            f"--retest: compares the sessions of column {column!r}, so that --by must "
-            "not take them apart",
+            f"--retest: compares the sessions of column {column!r}, so --by cannot "
+            "name that column",
         ),
         (
             not file.parts[0].items,
-            "--retest: needs ratings of items with names, and not --frequency",
+            "--retest: needs items with names, so it cannot be combined with "
+            "--frequency",
         ),
     )
     estimates: list[AgreementRow] = []
@@ -366,7 +367,7 @@ def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
         name, _, kind = title.partition(", ")
         why = result.reason
         if why is None and math.isinf(result.statistic):
-            why = "infinite: all items changed, and one way"
+            why = "infinite: all items changed, all in one direction"
         row = {
             "test": name.lower().replace("-", "_"),
             "kind": kind or None,
@@ -460,8 +461,8 @@ def _limits(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     refuse(
         (
             is_clustered and questions.kind == "proportional",
-            "--clusters: limits on a line take every item by itself, so needs one of "
-            "--clusters and --kind proportional, got both",
+            "--clusters: limits on a line treat items as independent: needed "
+            "--clusters or --kind proportional, got both",
         )
     )
     panels: list[tuple[Sequence[str], Any]] = []

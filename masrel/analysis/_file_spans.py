@@ -38,12 +38,12 @@ def span_answer(
     n_spans = sum(label is not None for _, _, label, *_ in rows)
     notes = {
         f"Spans: {n_spans}; observers: {len(observers)}.": True,
-        "CI: leaving out one document at a time, for other documents like these. "
+        "CI: from leaving out one document at a time, for other documents like these. "
         "Tokens: places, such as characters or steps.": True,
-        "No unitizing α: it needs to know how long every document is, by a column that "
-        "--length or --text names.": not is_known,
-        "An observer without a row in a document is taken not to have annotated it "
-        f"({n_absent} times).": n_absent,
+        "No unitizing α: it needs the length of every document; name its column with "
+        "--length or --text.": not is_known,
+        "An observer without a row for a document is treated as not having annotated "
+        f"it ({n_absent} times).": n_absent,
         f"Places are rounded, by up to {off:.2g} of a step.": off,
     }
     return Answer(

@@ -60,8 +60,8 @@ class Judging:
             (
                 self.order is not None
                 and (self.margin is not None or self.rate is not None or self.truth),
-                "--order: is of preferences, which --epsilon, --annotators, --rate and "
-                "--truth say nothing of",
+                "--order: is for preferences, so it cannot be combined with "
+                "--epsilon, --annotators, --rate or --truth",
             ),
         )
 

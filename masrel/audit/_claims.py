@@ -80,7 +80,7 @@ def _parse_printed(
     refuse(
         (
             not isinstance(text, str),
-            f"{where}: needs a text such as {example!r}, since its decimals count, "
+            f"{where}: needs a text such as {example!r}, because its decimals matter, "
             f"{got}",
         ),
         (
@@ -201,7 +201,7 @@ class Claim:
             (self.n_raters != 2, f"{key}: needs two raters, got {self.n_raters}"),
             (
                 not are_counts or len(margins) != self.n_categories,
-                f"{key}: needs {self.n_categories} counts, one a category, {got}",
+                f"{key}: needs {self.n_categories} counts, one per category, {got}",
             ),
             (
                 are_counts and sum(margins) not in sums,
@@ -216,19 +216,19 @@ class Claim:
             *(
                 (
                     key in printed and not (is_of_two and "kappa" in printed),
-                    f"{key}: needs the kappa of two raters beside it",
+                    f"{key}: needs the kappa of two raters as well",
                 )
                 for key in UNCERTAINTY
             ),
-            (high and not low, "low: needed beside high, got none"),
-            (low and not high, "high: needed beside low, got none"),
+            (high and not low, "low: needed with high, got none"),
+            (low and not high, "high: needed with low, got none"),
             (
                 not 0.5 <= self.level < 1,
                 f"level: needs a number from 0.5 to below 1, got {self.level:g}",
             ),
             (
                 low and high and low.value > high.value,
-                f"low: needs to be no higher than high, {self.high}, got {self.low}",
+                f"low: needs to be at most high, {self.high}, got {self.low}",
             ),
         )
 
@@ -314,7 +314,7 @@ def _claims_of(text: str) -> tuple[Claim, ...]:
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip(" ,;") and not line.startswith("#")
     }
-    needed = f"needs a line of column names and a row a claim, got {len(lines)} lines"
+    needed = f"needs a header and one row per claim, got {len(lines)} lines"
     refuse((len(lines) < 2, needed))
     first = next(iter(lines.values()))
     separator = ";" if first.count(";") > first.count(",") else ","
@@ -337,8 +337,8 @@ def _claims_of(text: str) -> tuple[Claim, ...]:
         *(
             (
                 len(row) != len(head),
-                f"row {number}: needs {len(head)} cells, as many as there are columns, "
-                f"got {len(row)}",
+                f"row {number}: needs {len(head)} cells, one per column, got "
+                f"{len(row)}",
             )
             for number, row in rows
         ),

@@ -170,8 +170,8 @@ class ClaimAudit:
         what = f"{both}{_numbers(claim)}{_beside(claim)}"
         if self.is_possible is None:
             return (
-                f"cannot tell whether any {table} gives {what}: the bound on work was "
-                "met first"
+                f"it cannot be decided whether any {table} gives {what}, because the "
+                "limit on computation was reached"
             )
         if not self.is_possible:
             tried = "the one reading" if n == 1 else f"any of the {n} readings"
@@ -183,7 +183,7 @@ class ClaimAudit:
         if all(reading.n_agreed for reading in some):
             agreed = [number for reading in some for number in reading.n_agreed]
             on = f"{ends_text(agreed)} of {claim.n_items}"
-            read += f"; in them the raters agree on {on}"
+            read += f"; in these the raters agree on {on}"
         return f"{count}{table.removeprefix('table')} {verb} {what}{read}"
 
 

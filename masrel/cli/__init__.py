@@ -28,16 +28,16 @@ __all__ = ["main"]
 
 GROUPS = {
     "Ratings you have": {
-        "agree": "Agreement of the raters in any file, no study needed.",
-        "compare": "Whether groups of ratings differ in agreement.",
-        "diagnose": "Which rater, which pair and which category disagree.",
-        "limits": "Limits of agreement of raters who measured, also repeatedly.",
-        "gstudy": "How reliable means over raters and occasions are, or would be.",
-        "spans": "Whether observers mark the same parts of texts or recordings.",
-        "judge": "Whether a judge, such as a model, rates as well as the humans.",
-        "latent": "Biases and noises of the raters in any file, items on one scale.",
-        "plan": "How many items and raters a study needs, and what it can show.",
-        "audit": "Whether any table gives the agreement that a paper prints.",
+        "agree": "Estimate how well the raters in a file agree.",
+        "compare": "Compare the agreement of groups.",
+        "diagnose": "Find the raters, pairs and categories that disagree.",
+        "limits": "Compute limits of agreement, also for repeated measurements.",
+        "gstudy": "Estimate how reliable means over raters and occasions are.",
+        "spans": "Measure agreement on marked parts of texts or recordings.",
+        "judge": "Test whether a judge, such as a model, can replace a human.",
+        "latent": "Estimate each rater's bias and noise, and each item's severity.",
+        "plan": "Find how many items and raters a study needs.",
+        "audit": "Check whether any table gives the agreement that a paper reports.",
     },
     "A study": {
         "demo": "Run a complete simulated study.",
@@ -77,8 +77,8 @@ cli = ListedCommands(
     ),
     context_settings={"help_option_names": ["-h", "--help"]},
     add_help_option=False,
-    help="\b\nAgreement of any file of ratings, and studies on a simulator of "
-    "spasticity.\nTo begin, with a file of ratings: masrel agree FILE --target items",
+    help="\b\nAgreement statistics for ratings, and studies on a simulator of "
+    "spasticity.\nTo start with a file of ratings: masrel agree FILE --target items",
 )
 cli = click.version_option(masrel.__version__, prog_name="masrel")(cli)
 cli = click.help_option("-h", "--help", hidden=True)(cli)  # whoever reads it knows
@@ -105,7 +105,7 @@ def main() -> None:
     except MasrelError as error:
         _fail(error, 2)
     except MemoryError as error:
-        _fail(f"needs more memory than there is. {error}".rstrip(". "), 1)
+        _fail(f"there is not enough memory. {error}".rstrip(". "), 1)
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
         _fail(f"{where}{error.strerror or error}", 2)

@@ -70,8 +70,8 @@ _ESTIMATING = {
         type=split_names,
         is_eager=True,
         callback=_list_register,
-        help="Names of coefficients, separated by commas; all that fit (but "
-        "lin_ccc, sem and mdc); or list, which prints them and ends.",
+        help='Coefficients, separated by commas; "all" computes every one that '
+        'fits, except lin_ccc, sem and mdc; "list" lists them.',
     ),
     "weights": click.option(
         "--weights",
@@ -80,75 +80,76 @@ _ESTIMATING = {
         metavar="NAME|FILE",
         show_default=True,
         help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
-        "bipolar; or the file of a matrix, as w.csv.",
+        "bipolar; or a file that holds a matrix, such as w.csv.",
     ),
     "metric": click.option(
         "--metric",
         type=click.Choice(
             ["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
         ),
-        help="Krippendorff's alpha by his difference function in place of weights; "
-        "jaccard and masi take grades of several labels: a;b, a|b or ['a', 'b'].",
+        help="Difference function of Krippendorff's alpha, used instead of weights; "
+        "jaccard and masi are for grades with several labels: a;b, a|b or ['a', 'b'].",
     ),
     "target": click.option(
         "--target",
         type=click.Choice(["items", "raters", "both"]),
-        help="What a new study would draw anew; no interval without it.",
+        help="Generalise to other items, raters, or both? Without it no interval is "
+        "given.",
     ),
     "interval": click.option(
         "--interval",
         type=click.Choice(get_args(IntervalMethod)),
         default="auto",
         show_default=True,
-        help="Kind of interval; auto is the newest rule that chooses one; analytic is "
-        "by formula, of ICC for both from F.",
+        help="Method of the interval; auto chooses by the newest rule; analytic uses "
+        "a formula, and the F distribution for an ICC.",
     ),
     "convention": click.option(
         "--convention",
         type=click.Choice(["irrcac", "spss", "over_n"]),
-        help="Errors and intervals for other items as irrCAC, SPSS, or psych and vcd "
-        "(over_n) print them, in place of ours.",
+        help="Give the standard error and interval for other items that irrCAC, SPSS, "
+        "or psych and vcd (over_n) print.",
     ),
     "level": click.option(
         "--level",
         default=0.95,
         show_default=True,
-        help="Level of intervals.",
+        help="Level of the intervals.",
     ),
     "resamples": click.option(
         "--resamples", "n_resamples", default=10_000, show_default=True
     ),
     "seed": click.option(
-        "--seed", default=0, show_default=True, help="Seed of resampling."
+        "--seed", default=0, show_default=True, help="Random seed for resampling."
     ),
     "words": click.option(
         "--words",
         type=click.Choice(["landis_koch", "altman", "fleiss", "cicchetti"]),
-        help="Name the best band that the true value reaches with 95 % probability.",
+        help="Name the highest band that the true value reaches with 95 % probability.",
     ),
 }
 
 by_option = click.option(
-    "--by", metavar="COL", help="Estimate each group of this column."
+    "--by", metavar="COL", help="Estimate separately for each group in this column."
 )
 _WORDING = (
     click.option(
         "--explain",
         is_flag=True,
-        help="Also say how numbers were made, and what intervals promise.",
+        help="Also explain how the numbers were computed and what the intervals mean.",
     ),
     click.option(
         "--item-name",
         default="items",
         metavar="PLURAL",
-        help="What items are called in words, such as patients.",
+        help="What to call the items in the text, such as patients.",
     ),
 )
 clusters_option = click.option(
     "--clusters",
     metavar="COL",
-    help="Column of the clusters that items come in, such as patients with several "
-    "sites: they are left out as a whole.",
+    help="Column of the clusters that items belong to, such as patients with several "
+    "sites; a cluster is left out as a whole.",
 )
 
 
@@ -189,13 +190,13 @@ def file_command(
         grouped("questions", Questions, *shared, *questions),
         *_WORDING,
         output_options(
-            json="Write a record of all here; - prints it, and nothing else, on "
-            "stdout.",
+            json='Write JSON to this file; "-" writes it to standard output and '
+            "prints nothing else.",
             figure=figure,
-            html="Write a page here: results, pictures, methods to paste; it needs "
-            "no other file.",
-            csv="Print every digit as CSV.",
-            latex="Print a LaTeX table.",
+            html="Write a self-contained page with results, figures, and a methods "
+            "text to paste.",
+            csv="Print the table as CSV, with all digits.",
+            latex="Print the table as LaTeX.",
             sentence=sentence,
         ),
     )
@@ -220,11 +221,13 @@ def _show_answers(
     refuse(
         (
             output.figure is not None and not has_figure,
-            "--figure: shows intervals, so it needs --target raters, items or both",
+            "--figure: needs --target raters, items or both, because it shows "
+            "intervals",
         ),
         (
             questions.truth and reading.repeated != "error",
-            f"--truth: takes every repeat, and --repeated {reading.repeated} does not",
+            "--truth: uses every repeat, so it cannot be combined with --repeated "
+            f"{reading.repeated}",
         ),
     )
     judging = questions.judging
@@ -343,4 +346,8 @@ def _offer_interval(command: str, items: str) -> None:
     # what follows a -- is no option
     parts = [*more, *arguments] if "--" in arguments else [*arguments, *more]
     call = shlex.join(["masrel", command, *parts])
-    click.echo(f"no interval; for other {items} like these: {call}", err=True)
+    click.echo(
+        f"No interval was asked for. To generalise to other {items}, add --target "
+        f"items: {call}",
+        err=True,
+    )

@@ -145,18 +145,21 @@ class OutputOptions:
             ),
             (
                 self.raw_csv and self.csv is False,
-                "--raw-csv: needs --csv, whose table it is about",
+                "--raw-csv: needs --csv",
             ),
             (
                 len(printed) > 1,
-                f"{' and '.join(printed)} want the same stdout: choose one",
+                f"{' and '.join(printed)} both write to standard output: choose one",
             ),
         )
 
 
 JSON_NAME = "masrel.json_name"  # where a call has the function to it from a command
 _FORMAT = 1  # of what verbs write as JSON
-_RAW = "With --csv: no apostrophe before a text that a spreadsheet would run."
+_RAW = (
+    "With --csv: do not put an apostrophe before cells that a spreadsheet would run "
+    "as formulas."
+)
 
 
 def output_options(

@@ -81,7 +81,7 @@ def _compare(key: str, more: Sequence[Path]) -> None:
         *(
             (
                 path.parent.resolve() / path.name in inputs or path.resolve() in inputs,
-                f"{path}: needs another file to write, this one is read",
+                f"{path}: needs a different output file, because this one is an input",
             )
             for path in paths.get(_OUTPUTS, ())
         )

@@ -38,66 +38,66 @@ reading_options = [
         "--item",
         multiple=True,
         metavar="COL",
-        help="Column of the items; A,B for several.",
+        help="Column of the items; A,B if it takes several columns to name an item.",
     ),
     click.option(
-        "--rater", metavar="COL", help="Column of the raters (one row a rating)."
+        "--rater", metavar="COL", help="Column of the raters (one row per rating)."
     ),
     click.option(
-        "--grade", metavar="COL", help="Column of the grades (one row a rating)."
+        "--grade", metavar="COL", help="Column of the grades (one row per rating)."
     ),
     click.option(
         "--raters",
         multiple=True,
         metavar="COL,…",
-        help="Columns that are raters (one row an item).",
+        help="Columns of the raters (one row per item).",
     ),
-    click.option(
-        "--ignore", multiple=True, metavar="COL,…", help="Columns that are left aside."
-    ),
+    click.option("--ignore", multiple=True, metavar="COL,…", help="Columns to ignore."),
     click.option("--no-item", is_flag=True, help="No column names the items."),
     click.option(
-        "--no-header", is_flag=True, help="No line of names; columns are 1, 2, 3 …"
+        "--no-header",
+        is_flag=True,
+        help="There is no header; the columns are called 1, 2, 3 …",
     ),
     click.option(
         "--skip",
         type=click.IntRange(min=0),
         default=0,
         metavar="N",
-        help="Lines, or rows of a sheet, above the line of names.",
+        help="Number of lines, or rows of a sheet, above the header.",
     ),
     click.option(
         "--header",
         type=lambda text: tuple(map(int, filter(None, split_commas(text)))),
         default="",
         metavar="N,…",
-        help="Lines that make up the names; data begin below the last.",
+        help="Lines that form the header; the data begin below the last of them.",
     ),
     click.option("--session", metavar="COL", help="Column of the sessions."),
     click.option(
         "--frequency",
         metavar="COL",
-        help="Column of how many items each row stands for (one row a pattern).",
+        help="Column with the number of items that have the pattern in the row.",
     ),
     click.option(
         "--repeated",
         type=click.Choice(["error", "first", "last", "mean"]),
         default="error",
         show_default=True,
-        help="What becomes of a second grade of an item by a rater.",
+        help="What to do with a second grade of an item by the same rater.",
     ),
     click.option(
         "--categories",
         type=split_commas,
         metavar="GRADE,…",
-        help="Every grade of the scale in order, such as 0,1,1+,2,3,4.",
+        help="All grades of the scale in order, such as 0,1,1+,2,3,4.",
     ),
     click.option(
         "--missing",
         "missing_codes",
         multiple=True,
         metavar="CODE,…",
-        help="Cells that are missing grades, beside empty ones and NA.",
+        help="Cells that mean a missing grade, besides empty cells and NA.",
     ),
     click.option(
         "--decimal",
@@ -108,63 +108,65 @@ reading_options = [
     click.option(
         "--thousands",
         metavar="CHAR",
-        help="Mark between thousands, such as the comma of 1,200.",
+        help="Thousands separator, such as the comma in 1,200.",
     ),
     click.option(
         "--units",
         is_flag=True,
-        help="Take the unit off, as of 5 mm or 78%: every number has the same.",
+        help="Remove the unit, as in 5 mm or 78%; all numbers must have the same one.",
     ),
     click.option(
         "--set-separator",
         metavar="SEP",
-        help="What stands between the labels of a cell, for --metric jaccard or masi.",
+        help="Separator of the labels in a cell, for --metric jaccard or masi.",
     ),
     click.option(
         "--delimiter",
         default="auto",
         show_default=True,
         metavar="CHAR",
-        help="Separator of cells; tab and blanks by name.",
+        help="Separator of the cells: a character, or the word tab or blanks.",
     ),
     click.option(
         "--encoding",
         metavar="NAME",
-        help="Encoding of text, such as latin-1; UTF-8 or what its mark says.",
+        help="Encoding of the text, such as latin-1. Default: UTF-8, or what the byte "
+        "order mark says.",
     ),
     click.option("--sheet", metavar="NAME", help="Sheet of a workbook."),
     click.option(
-        "--transpose", is_flag=True, help="A row is a rater, a column an item."
+        "--transpose", is_flag=True, help="Each row is a rater and each column an item."
     ),
     click.option(
         "--from",
         "source",
         metavar="TOOL",
-        help="Tool whose export it is: label-studio, doccano, prodigy, inception; "
+        help="Tool that exported the file: label-studio, doccano, prodigy, inception; "
         "inspect-ai, lm-eval, promptfoo, mlflow, langsmith, langfuse, mt-bench.",
     ),
 ]
-"""Options of verbs that read a file of ratings."""
+"""Options of commands that read a file of ratings."""
 
 table_options = [
     click.option(
         "--by-criterion",
         is_flag=True,
-        help="Columns are criteria by raters, as tone_Kim, tone_Lee, gait_Kim …: "
-        "estimate each criterion; --raters then names raters.",
+        help="Columns combine a criterion and a rater, as tone_Kim, tone_Lee, "
+        "gait_Kim …: estimate each criterion separately; --raters then gives the "
+        "names of the raters.",
     ),
     click.option(
         "--counts",
         is_flag=True,
-        help="Items by categories: how many raters chose each.",
+        help="The table counts, for each item, how many raters chose each category.",
     ),
     click.option(
         "--table",
         is_flag=True,
-        help="A contingency table of two raters, the first in rows.",
+        help="The file is a contingency table of two raters, with the first in rows.",
     ),
 ]
-"""Options of verbs that need not know who rated what."""
+"""Options of commands that need not know who rated what."""
 
 
 def options_of(*names: str) -> list[Decorator]:

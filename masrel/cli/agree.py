@@ -8,17 +8,17 @@ agree = file_command(
     "agree",
     """Estimate the agreement of the raters in FILE.
 
-    FILE is a table in whatever shape a program left it: text, a workbook, Parquet,
-    JSON, SPSS, Stata, SAS, packed or not; one row an item and a column a rater, or
-    one row a rating. "-" reads standard input. What was read is shown; what could be
-    read in two ways is refused with the option that decides.
+    FILE is a table as a program saved it: text, a workbook, Parquet, JSON, SPSS, Stata
+    or SAS, compressed or not. It has one row per item and one column per rater, or one
+    row per rating. "-" reads standard input. The command shows what it read. If a file
+    is ambiguous, the command names the option that decides.
     """,
     by_option,
     click.option(
         "--stream/--no-stream",
         default=None,
-        help="Read batch by batch, as files larger than memory are (Parquet, text); by "
-        "size unless given.",
+        help="Read in batches, for files larger than memory (Parquet, text). Default: "
+        "depends on the size of the file.",
     ),
     clusters_option,
     estimating=(
@@ -29,27 +29,28 @@ agree = file_command(
         click.option(
             "--retest",
             is_flag=True,
-            help="Agreement of each rater with him- or herself in the two sessions of "
-            "--session, and of all; stratified_kappa, and pooled_kappa if named.",
+            help="Agreement of each rater with themselves between the two sessions of "
+            "--session, and of all raters together, by stratified_kappa, and by "
+            "pooled_kappa if it is named.",
         ),
         click.option(
             "--each-category",
             is_flag=True,
-            help="Kappa of each category against all others.",
+            help="Kappa of each category against all other categories.",
         ),
         click.option(
             "--symmetry",
             is_flag=True,
-            help="Tests of change of two raters: McNemar, Bowker, Stuart-Maxwell, "
-            "Bhapkar.",
+            help="Tests of change between two raters: McNemar, Bowker, "
+            "Stuart-Maxwell, Bhapkar.",
         ),
         click.option(
             "--indices",
             is_flag=True,
-            help="Of two raters and two categories: PABAK, prevalence, bias, largest "
+            help="For two raters and two categories: PABAK, prevalence, bias, largest "
             "kappa, positive and negative agreement.",
         ),
     ],
-    figure="Draw the intervals into this .png, .svg or .pdf; needs --target.",
-    sentence="Print a sentence for a paper instead of the table, one an estimate.",
+    figure="Draw the intervals to this .png, .svg or .pdf file; needs --target.",
+    sentence="Print one sentence per estimate, for a paper, instead of the table.",
 )

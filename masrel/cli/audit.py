@@ -26,47 +26,64 @@ _WEIGHTS = click.Choice(["identity", "linear", "quadratic", "any"])
 
 @click.command("audit", cls=GroupedHelp)
 @click.argument("source", required=False, type=click.Path(path_type=Path))
-@click.option("--items", "n_items", metavar="INTEGER", help="Items that were rated.")
-@click.option("--categories", "n_categories", metavar="INTEGER", help="Of the scale.")
+@click.option("--items", "n_items", metavar="INTEGER", help="Number of items.")
 @click.option(
-    "--raters", "n_raters", metavar="INTEGER", help="Of each item; default: 2."
+    "--categories",
+    "n_categories",
+    metavar="INTEGER",
+    help="Number of categories of the scale.",
 )
 @click.option(
-    "--agreement", metavar="TEXT", help="In percent, with the decimals printed."
+    "--raters", "n_raters", metavar="INTEGER", help="Raters of each item; default: 2."
 )
-@click.option("--kappa", metavar="TEXT", help="With the decimals printed.")
+@click.option(
+    "--agreement",
+    metavar="TEXT",
+    help="Agreement in percent, with the decimals that are printed.",
+)
+@click.option(
+    "--kappa", metavar="TEXT", help="Kappa, with the decimals that are printed."
+)
 @click.option(
     "--agreement-weights",
     type=_WEIGHTS,
-    help="Of the agreement; default: identity.",
+    help="Weights of the agreement; default: identity.",
 )
-@click.option("--kappa-weights", type=_WEIGHTS, help="Of kappa; default: any.")
+@click.option("--kappa-weights", type=_WEIGHTS, help="Weights of kappa; default: any.")
 @click.option(
     "--rounding",
     type=click.Choice(["half_even", "half_up", "either"]),
-    help="What became of ties; default: either.",
+    help="How ties were rounded; default: either.",
 )
 @click.option(
     "--margins-1",
     metavar="COUNTS",
     help='Items per category of the first of two raters: "9 11".',
 )
-@click.option("--margins-2", metavar="COUNTS", help="Those of the second.")
-@click.option("--standard-error", metavar="TEXT", help="Of kappa.")
-@click.option("--interval", nargs=2, metavar="LOW HIGH", help="The interval of kappa.")
-@click.option("--level", metavar="FLOAT", help="Of the interval; default: 0.95.")
-@click.option("--p", metavar="TEXT", help='Of kappa 0: "0.003" or "<0.001".')
+@click.option(
+    "--margins-2", metavar="COUNTS", help="Items per category of the second rater."
+)
+@click.option("--standard-error", metavar="TEXT", help="Standard error of kappa.")
+@click.option("--interval", nargs=2, metavar="LOW HIGH", help="Interval of kappa.")
+@click.option("--level", metavar="FLOAT", help="Level of the interval; default: 0.95.")
+@click.option(
+    "--p",
+    metavar="TEXT",
+    help='P-value of the test that kappa is 0: "0.003" or "<0.001".',
+)
 @click.option(
     "--unrated",
     "n_unrated",
     metavar="INTEGER",
-    help="Items at most that may have been left out since a rating was absent.",
+    help="Largest number of items that may have been left out because of a missing "
+    "rating.",
 )
 @output_options(
-    json="Write every reading here; - prints it, and nothing else, on stdout.",
-    csv="Print every reading as CSV.",
-    latex="Print LaTeX tables.",
-    sentence="Print a sentence a claim instead of the tables.",
+    json='Write JSON to this file; "-" writes it to standard output and prints '
+    "nothing else.",
+    csv="Print all readings as CSV.",
+    latex="Print the tables as LaTeX.",
+    sentence="Print one sentence per claim instead of the tables.",
 )
 def audit(
     source: Path | None, output: OutputOptions, **printed: str | tuple[str, str] | None
@@ -105,7 +122,10 @@ def audit(
 def _claims(source: Path, texts: _Texts) -> "tuple[Claim, ...]":
     from masrel.audit import read_claims
 
-    has_own = f"{source}: has claims of its own, so it needs no option that has one"
+    has_own = (
+        f"{source}: contains claims, so it cannot be combined with options that give "
+        "a claim"
+    )
     refuse((texts, has_own))
     file = source
     if source.is_dir():
@@ -132,7 +152,7 @@ def _claim(texts: _Texts) -> "Claim":
         *(
             (
                 name in texts and other not in texts,
-                f"{name}: needs --{other} beside it, got none",
+                f"{name}: needs --{other} as well, got none",
             )
             for name, other in _BESIDE.items()
         ),

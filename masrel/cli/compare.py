@@ -8,13 +8,14 @@ compare = file_command(
     "compare",
     """Compare the agreement of groups in FILE.
 
-    The difference of every two groups of --by has an interval for other items, a
-    p-value, and Holm's adjustment of it; of three groups or more it is tested whether
-    all agree as well. FILE is whatever masrel agree reads.
+    The difference between every two groups of --by is given with an interval for other
+    items and a p-value, which is also adjusted by Holm's method. With three groups or
+    more, a test shows whether all of them agree equally well. FILE can be any file that
+    masrel agree reads.
     """,
     click.option("--by", metavar="COL", help="Column of the groups."),
     clusters_option,
     estimating=("coefficients", "weights", "metric", "level"),
-    figure="Draw each group's intervals into this .png, .svg or .pdf.",
+    figure="Draw each group's intervals to this .png, .svg or .pdf file.",
     target="items",
 )

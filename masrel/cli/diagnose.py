@@ -6,17 +6,18 @@ from masrel.cli._file_answers import by_option, file_command
 
 diagnose = file_command(
     "diagnose",
-    """Say which rater, which pair and which category of FILE disagree.
+    """Find the raters, pairs and categories of FILE that disagree.
 
-    Every pair of raters, all raters without each, every category, and what each rater
-    says where another says something else. FILE is whatever masrel agree reads.
+    The command shows the agreement of every pair of raters, of all raters without each
+    one, and on each category, and each rater's grades by those of another rater. FILE
+    can be any file that masrel agree reads.
     """,
     by_option,
     click.option(
         "--reference",
         metavar="RATER",
-        help="The rater that the others are held against, and that is in no estimate "
-        "between raters.",
+        help="The rater to compare the others with; not included in estimates between "
+        "raters.",
     ),
     estimating=("weights", "metric", "level"),
     questions=[
@@ -24,13 +25,15 @@ diagnose = file_command(
             "--coefficients",
             metavar="NAME",
             show_default="fleiss_kappa",
-            help="Name of the coefficient; masrel agree --coefficients list has all.",
+            help="Name of the coefficient; masrel agree --coefficients list shows all "
+            "names.",
         ),
         click.option(
             "--target",
             type=click.Choice(["items"]),
-            help="Intervals for other items, graded by these raters; none without it.",
+            help="Generalise to other items graded by these raters. Without it no "
+            "interval is given.",
         ),
     ],
-    figure="Draw raters, pairs and confusions into this .png, .svg or .pdf.",
+    figure="Draw raters, pairs and confusions to this .png, .svg or .pdf file.",
 )

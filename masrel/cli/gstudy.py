@@ -35,22 +35,23 @@ _LEVELS = ((1, 2, 3, 4, 6, 8), (1, 2, 4), (1, 2))
     type=split_commas,
     required=True,
     metavar="COL,…",
-    help="Columns of one to three conditions of measurement, such as rater,occasion.",
+    help="Columns of one to three facets, such as rater,occasion.",
 )
 @click.option(
     "--nested",
     multiple=True,
     metavar="FACET:COL",
-    help="A facet whose levels lie within those of another, as rater:task.",
+    help="A facet nested in another, such as rater:task.",
 )
 @click.option(
     "--fixed",
     multiple=True,
     metavar="COL",
-    help="A facet whose levels are all there are; of others they are a sample.",
+    help="A fixed facet: its levels are the only ones of interest. Levels of other "
+    "facets are a sample.",
 )
 @click.option(
-    "--cut", type=float, help="A grade at which persons are told apart, for Φ(λ)."
+    "--cut", type=float, help="Cut-off grade that separates persons, for Φ(λ)."
 )
 @click.option(
     "--for",
@@ -58,34 +59,36 @@ _LEVELS = ((1, 2, 3, 4, 6, 8), (1, 2, 4), (1, 2))
     type=whole_numbers,
     multiple=True,
     metavar="N,…",
-    help="A design: levels of each facet, in their order; several times for several.",
+    help="A design: number of levels of each facet, in order; repeat the option for "
+    "several designs.",
 )
-@click.option("--aim", type=float, help="Seek the cheapest design that has this Φ.")
+@click.option("--aim", type=float, help="Find the cheapest design that reaches this Φ.")
 @click.option(
     "--persons",
     type=whole_numbers,
     metavar="N,…",
-    help="How many a study to come has: the interval that the designs of --for and the "
-    "cheapest can expect, and the chance that it lies above --aim, by 200 simulated "
-    "studies.",
+    help="Number of persons in a future study. Gives the interval to expect with each "
+    "design of --for and with the cheapest, and the probability that it lies above "
+    "--aim, from 200 simulated studies.",
 )
 @click.option(
     "--seek",
     type=click.Choice(["dependability", "generalizability"]),
     default="dependability",
     show_default=True,
-    help="What the aim is for: Φ, or Eρ², where persons are only compared.",
+    help="The coefficient of the aim: Φ, or Eρ² if persons are only compared.",
 )
 @click.option(
     "--cost",
     "prices",
     type=floats,
     metavar="N,…",
-    help="Prices: of a level of each facet, in their order, and of a rating.  "
-    "[default: 0,…,1]",
+    help="Cost of a level of each facet, in order, and of a rating.  [default: 0,…,1]",
 )
-@click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
-@click.option("--seed", "rng", default=0, show_default=True, help="Seed of draws.")
+@click.option(
+    "--level", default=0.95, show_default=True, help="Level of the intervals."
+)
+@click.option("--seed", "rng", default=0, show_default=True, help="Random seed.")
 @grouped(
     "reading",
     Reading,
@@ -94,11 +97,13 @@ _LEVELS = ((1, 2, 3, 4, 6, 8), (1, 2, 4), (1, 2))
     *options_of("encoding", "sheet"),
 )
 @output_options(
-    json="Write every number here; - prints them, and nothing else, on stdout.",
-    figure="Draw reliability over numbers of levels into this .png, .svg or .pdf.",
-    html="Write a page here that needs no other file.",
-    csv="Print every digit as CSV.",
-    latex="Print LaTeX tables.",
+    json='Write JSON to this file; "-" writes it to standard output and prints '
+    "nothing else.",
+    figure="Draw reliability against numbers of levels to this .png, .svg or .pdf "
+    "file.",
+    html="Write a self-contained page.",
+    csv="Print the tables as CSV, with all digits.",
+    latex="Print the tables as LaTeX.",
 )
 def gstudy(
     file: Path,
@@ -127,10 +132,13 @@ def gstudy(
             any(len(n) != len(facets) for n in sizes),
             f"--for: needs one number for each of {listed(facets)}, got {[*sizes]}",
         ),
-        (prices and aim is None, "--cost: needs --aim, for which a design is sought"),
+        (
+            prices and aim is None,
+            ("--cost: needs --aim, the value to reach at the lowest cost"),
+        ),
         (
             persons and aim is None and not sizes,
-            "--persons: needs the designs that they are for, by --for or --aim",
+            "--persons: needs designs, by --for or --aim",
         ),
     )
     # imported here: they load slowly, and a call that is refused needs none of them

@@ -18,27 +18,29 @@ def _judged(*args: Any) -> Any:
 
 judge = file_command(
     "judge",
-    """Hold judges in FILE against its humans, and correct a rate for a judge.
+    """Compare judges in FILE with its humans, and correct a rate for a judge's errors.
 
-    A judge, such as a language model, may stand for a human if it is shown to agree
-    with the other humans not much worse than the human does: the alternative annotator
+    A judge, such as a language model, can replace a human if it agrees with the other
+    humans almost as well as the human does. This is tested by the alternative annotator
     test. --rate estimates how often a grade is right, from a judge's grades of many
-    items and labels of few. FILE is whatever masrel agree reads; judges are raters.
+    items and labels of a few. FILE can be any file that masrel agree reads; judges are
+    raters in it.
     """,
     by_option,
     clusters_option,
     click.option(
         "--reference",
         metavar="RATER",
-        help="Rater with the right grades: the labels of --rate, and no human.",
+        help="Rater with the correct grades, which are the labels of --rate; not "
+        "counted as a human.",
     ),
     estimating=("level", "seed"),
     questions=[
         click.option(
             "--target",
             type=click.Choice(["items", "both"]),
-            help="Whom the interval of the advantage is for: other items, or other "
-            "humans, too.  [default: no interval]",
+            help="Generalise the advantage to other items, or to other humans as "
+            "well?  [default: no interval]",
         ),
     ],
     of_judges=[_judged],
@@ -50,74 +52,75 @@ judge = file_command(
             "judges",
             multiple=True,
             metavar="RATER",
-            help="Rater that is a judge; may be given several times.",
+            help="Rater that is a judge; can be given several times.",
         ),
         click.option(
             "--humans",
             type=split_names,
             metavar="NAMES",
-            help="Raters who are humans.  [default: all that are no judge]",
+            help="Raters who are humans.  [default: all except the judges]",
         ),
         click.option(
             "--epsilon",
             type=float,
             metavar="SHARE",
-            help="How much worse than a human a judge may be, as its price is low.",
+            help="How much worse than a human a judge may be because it costs less.",
         ),
         click.option(
             "--annotators",
             type=click.Choice(["expert", "skilled", "crowd"]),
-            help="Who the humans are, in place of --epsilon: 0.2, 0.15 or 0.1.",
+            help="Kind of humans, instead of --epsilon: it becomes 0.2, 0.15 or 0.1.",
         ),
         click.option(
             "--score",
             default="accuracy",
             metavar="accuracy|neg_rmse|WEIGHTS",
             show_default=True,
-            help="How near two grades are: the same or not, by their distance, or by "
-            "weights, such as linear.",
+            help="How to measure the closeness of two grades: same or not, by "
+            "distance, or by weights, such as linear.",
         ),
         click.option(
             "--test",
             type=click.Choice(["auto", "exact", "score", "t"]),
             default="auto",
             show_default=True,
-            help="auto is exact, and Tango's score test of many items; t is the one "
-            "that was published, and rejects too often.",
+            help="auto is the exact test, or Tango's score test for many items; t is "
+            "the published test, which rejects too often.",
         ),
         click.option(
             "--min-items",
             default=30,
             show_default=True,
-            help="Items that a human needs to be tested.",
+            help="Fewest items for which a human is tested.",
         ),
         click.option(
             "--rate",
             metavar="GRADE",
-            help="Estimate how often this grade is right; labels are those of "
-            "--reference, or of the one human.",
+            help="Estimate how often this grade is right; the labels are from "
+            "--reference, or from the only human.",
         ),
         click.option(
             "--truth",
             is_flag=True,
-            help="Estimate the class of each item and the errors of each rater without "
-            "labels (Dawid and Skene); classes are in --json.",
+            help="Estimate the class of each item and the errors of each rater "
+            "without labels (Dawid and Skene); --json has the classes.",
         ),
         click.option(
             "--order",
             metavar="COL",
-            help="Column of which of two answers was shown first; grades are the one "
-            "preferred, or a tie: how far the order decides, and which is better.",
+            help="Column with the answer that was shown first, if each grade is the "
+            "preferred one of two answers, or a tie; tests the effect of the order "
+            "and ranks the answers.",
         ),
         click.option(
             "--require",
             multiple=True,
             metavar="GATE",
-            help="Exit with 1 unless a number keeps a limit, as 'gpt-4o.winning_rate "
-            ">= 0.5': winning_rate, advantage, low or high of a judge; value, low or "
-            "high of rate; agreement of preferences.",
+            help="Exit with 1 unless a number meets a limit, as 'gpt-4o.winning_rate "
+            ">= 0.5'. Numbers: winning_rate, advantage, low or high of a judge; "
+            "value, low or high of rate; agreement of preferences.",
         ),
     ),
-    figure="Draw the judge beside each human, or rates, into this .png, .svg or .pdf.",
-    sentence="Print the result in sentences instead of tables.",
+    figure="Draw the judge and each human, or rates, to this .png, .svg or .pdf file.",
+    sentence="Print the result as sentences instead of tables.",
 )

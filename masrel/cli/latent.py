@@ -32,23 +32,31 @@ if TYPE_CHECKING:
     "--items",
     type=click.Choice(["fixed", "random"]),
     required=True,
-    help="Whether kappa is for these items, or for new ones like them.",
+    help="Give kappa for these items, or for new items like them.",
 )
 @grouped("reading", Reading, *reading_options)
-@click.option("--only", metavar="SESSION", help="Which session, of several.")
-@click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the sampler.")
+@click.option(
+    "--only", metavar="SESSION", help="Session to analyse, if there are several."
+)
+@click.option(
+    "--level", default=0.95, show_default=True, help="Level of the intervals."
+)
+@click.option(
+    "--seed", default=0, show_default=True, help="Random seed of the sampler."
+)
 @click.option(
     "--one-prior",
     is_flag=True,
-    help="Leave out the other prior: half the time, and its influence unseen.",
+    help="Do not compare with a second prior; takes half the time, but does not show "
+    "the influence of the prior.",
 )
 @output_options(
-    json="Write the result here; - prints it, and nothing else, on stdout.",
-    figure="Draw the scale into this .png, .svg or .pdf.",
-    html="Write a page here that needs no other file.",
-    csv="Print every digit as CSV.",
-    quiet="No progress.",
+    json='Write JSON to this file; "-" writes it to standard output and prints '
+    "nothing else.",
+    figure="Draw the scale to this .png, .svg or .pdf file.",
+    html="Write a self-contained page.",
+    csv="Print the tables as CSV, with all digits.",
+    quiet="Do not show progress.",
 )
 def latent(
     file: Path,
@@ -123,7 +131,7 @@ def _part(ratings: "RatingsFile", file: Path, session: str | None) -> "RatingsPa
     if session is None and len(parts) == 1:
         return ratings.parts[0]
     known = ", ".join(parts)
-    needed = f"{file}: holds {len(parts)} sessions ({known}); --only chooses one"
+    needed = f"{file}: has {len(parts)} sessions ({known}); choose one with --only"
     absent = f"{file}: --only: holds no session {session}, but {known}"
     refuse(
         (session is None, needed), (session not in parts, absent), error=RatingsError

@@ -7,12 +7,13 @@ from masrel.cli._file_answers import by_option, clusters_option, file_command
 
 limits = file_command(
     "limits",
-    """Give the limits of agreement of raters who measured the items of FILE.
+    """Compute limits of agreement of raters who measured the items of FILE.
 
-    Of two raters the mean of their differences, and Bland and Altman's limits, with
-    exact intervals; of more of them the limits with their mean, SEM and MDC95; ICC(A,1)
-    and Lin's concordance beside them. FILE is whatever masrel agree reads; items that a
-    rater measured more than once need --truth.
+    For two raters, the command gives the mean of their differences and Bland and
+    Altman's limits, with exact intervals. For more raters, it gives limits of agreement
+    with their mean, SEM and MDC95. ICC(A,1) and Lin's concordance are also shown. FILE
+    can be any file that masrel agree reads. If a rater measured items more than once,
+    add --truth.
     """,
     by_option,
     clusters_option,
@@ -24,16 +25,17 @@ limits = file_command(
         click.option(
             "--truth",
             type=click.Choice(["constant", "varying"]),
-            help="Take items that are there more than once, or in several sessions, as "
-            "repeats: of one true value, or of pairs of rows whose value may move.",
+            help="Treat several measurements of an item, also in several sessions, as "
+            "repeats: with one true value, or in pairs of rows between which the true "
+            "value may change.",
         ),
         click.option(
             "--kind",
             type=click.Choice(["proportional", "ratio"]),
-            help="Limits that follow the mean of both raters in a line, or of ratios; "
-            "else of differences alike whatever is measured.",
+            help="Limits that follow a line over the mean of both raters, or limits "
+            "of ratios. Default: the same limits for all values.",
         ),
     ],
-    figure="Draw differences and limits into this .png, .svg or .pdf.",
+    figure="Draw differences and limits to this .png, .svg or .pdf file.",
     coefficients=list(OF_MEASUREMENTS),
 )

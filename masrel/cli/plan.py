@@ -45,104 +45,121 @@ _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
 
 @click.command("plan", cls=GroupedHelp)
 @click.argument("study", required=False, type=InputFile(path_type=Path))
-@click.option("--coefficient", help="Its name.  [default: fleiss_kappa]")
+@click.option("--coefficient", help="Name of the coefficient.  [default: fleiss_kappa]")
 @click.option(
     "--pilot",
     type=InputFile(path_type=Path),
     metavar="FILE",
-    help="Ratings of which value, prevalences and missing share are taken, unless they "
-    "are arguments.",
+    help="File of ratings from which value, prevalences and missing share are "
+    "estimated, unless you give them.",
 )
 @click.option(
-    "--value", type=floats, metavar="NUMBERS", help="True coefficient, or several."
+    "--value",
+    type=floats,
+    metavar="NUMBERS",
+    help="True value of the coefficient, or several values.",
 )
 @click.option(
     "--items",
     "n_items",
     type=whole_numbers,
     metavar="NUMBERS",
-    help="How many, as 30, 20,40 or 20:60:10.",
+    help="Number of items, as 30, 20,40 or 20:60:10.",
 )
 @click.option(
     "--raters",
     "n_raters",
     type=whole_numbers,
     metavar="NUMBERS",
-    help="The same. One of both is solved for where it is left out; with --prices both "
-    "are.",
+    help="Number of raters. If either number is left out, it is solved for; with "
+    "--prices both are.",
 )
-@click.option("--categories", type=int, help="How many, each as frequent.")
+@click.option(
+    "--categories", type=int, help="Number of categories, all equally frequent."
+)
 @click.option(
     "--prevalences",
     type=_prevalences,
     metavar="SHARES",
-    help="Of the categories, as 0.7,0.3; several with ;, or the rows of a table.",
+    help="Prevalences of the categories, as 0.7,0.3; separate several with ;, or the "
+    "rows of a table.",
 )
 @click.option(
     "--weights",
     type=weights_of_option,
     metavar="NAME|FILE",
-    help="A name, or the file of a matrix in the order of the categories, as w.csv.  "
-    "[default: identity]",
+    help="A name, or a file that holds a matrix in the order of the categories, such "
+    "as w.csv.  [default: identity]",
 )
 @click.option(
-    "--model", type=click.Choice(_MODELS), help="How the ratings of an item come about."
+    "--model", type=click.Choice(_MODELS), help="Model of the ratings of an item."
 )
 @click.option(
     "--target",
     type=click.Choice(["items", "raters", "both"]),
-    help="What a new study would draw anew.",
+    help="Generalise to other items, raters, or both?",
 )
-@click.option("--missing", "p_missing", type=float, help="Share of ratings missing.")
-@click.option("--level", type=float, help="[default: 0.95]")
-@click.option("--sides", type=int, help="1 or 2.  [default: 2]")
-@click.option("--half-width", type=float, help="Aim: half the interval's width.")
-@click.option("--lower", type=float, help="Aim: no end below this.")
-@click.option("--upper", type=float, help="Aim: no end above this.")
-@click.option("--null", type=float, help="Aim: this is excluded, with --power.")
-@click.option("--power", type=float, help="Chance to exclude --null.")
-@click.option("--assurance", type=float, help="Chance to reach the aim.")
-@click.option("--max-cost", type=float, help="What the study may cost.")
+@click.option("--missing", "p_missing", type=float, help="Share of missing ratings.")
+@click.option("--level", type=float, help="Level of the interval.  [default: 0.95]")
+@click.option("--sides", type=int, help="One-sided (1) or two-sided (2).  [default: 2]")
+@click.option("--half-width", type=float, help="Aim: half-width of the interval.")
+@click.option("--lower", type=float, help="Aim: lower limit not below this.")
+@click.option("--upper", type=float, help="Aim: upper limit not above this.")
+@click.option(
+    "--null", type=float, help="Aim: the interval excludes this value, with --power."
+)
+@click.option("--power", type=float, help="Probability of excluding --null.")
+@click.option("--assurance", type=float, help="Probability of reaching the aim.")
+@click.option("--max-cost", type=float, help="Highest cost of the study.")
 @click.option(
     "--prices",
     type=floats,
     metavar="NUMBERS",
-    help="Of an item, a rater, a rating.  [default: 0,0,1]",
+    help="Cost of an item, a rater and a rating.  [default: 0,0,1]",
 )
 @click.option(
     "--interval",
     type=click.Choice(_INTERVALS),
-    help="What an analysis computes, or estimate ± quantile · standard error (t, "
-    "normal).  [default: auto]",
+    help="Interval that an analysis would compute, or estimate ± quantile · standard "
+    "error (t, normal).  [default: auto]",
 )
-@click.option("--method", type=click.Choice(_METHODS), help="[default: auto]")
-@click.option("--seed", "rng", type=click.IntRange(min=0), help="[default: 0]")
+@click.option(
+    "--method",
+    type=click.Choice(_METHODS),
+    help="Method of computation.  [default: auto]",
+)
+@click.option(
+    "--seed", "rng", type=click.IntRange(min=0), help="Random seed.  [default: 0]"
+)
 @click.option(
     "--studies",
     "n_studies",
     type=click.IntRange(min=1),
-    help="How many are simulated.  [default: as many as the error needs]",
+    help="Number of simulated studies.  [default: as many as the error needs]",
 )
 @click.option(
     "--error",
     type=float,
-    help="Standard error of any estimate in a study of --items: how many items, "
-    "documents or clusters make its interval ± --half-width.",
+    help="Standard error of any estimate from a study with --items; gives the number "
+    "of items, documents or clusters for an interval of ± --half-width.",
 )
 @click.option(
     "--executor",
     type=click.Choice(["dask"]),
-    help="Who plans a grid, in place of this process.",
+    help="Plan a grid with this executor, instead of in this process.",
 )
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster.")
-@click.option("--toml", is_flag=True, help="Print lines for a protocol instead.")
+@click.option("--scheduler", metavar="ADDRESS", help="Address of a Dask cluster.")
+@click.option(
+    "--toml", is_flag=True, help="Print lines for a protocol instead of the table."
+)
 @output_options(
-    json="Write every number here; - prints them, and nothing else, on stdout.",
-    figure="Draw the curve of a grid into this .png, .svg or .pdf.",
-    csv="Print every digit as CSV.",
-    latex="Print a LaTeX table.",
+    json='Write JSON to this file; "-" writes it to standard output and prints '
+    "nothing else.",
+    figure="Draw the curve of a grid to this .png, .svg or .pdf file.",
+    csv="Print the table as CSV, with all digits.",
+    latex="Print the table as LaTeX.",
     sentence="Print a sentence for a protocol instead of the table.",
-    quiet="No progress.",
+    quiet="Do not show progress.",
 )
 def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) -> None:
     """Say how large a study must be, or what STUDY can show.
@@ -165,11 +182,11 @@ def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) 
         ),
         (
             output.figure is not None and max(map(len, sizes)) < 2,
-            "--figure: needs several --items or --raters, as 20:60:10",
+            "--figure: needs several --items or --raters, such as 20:60:10",
         ),
         (
             toml and isinstance(arguments.get("weights"), Path),
-            "--toml: a protocol has weights by name, got a file",
+            "--toml: a protocol needs a name of weights, got a file",
         ),
     )
     from masrel.tables import _planning_tables as tables
@@ -192,8 +209,8 @@ def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) 
 def _plan_units(arguments: dict[str, Any], output: OutputOptions) -> None:
     """Say how many units make the interval of an estimate narrow enough."""
     absent = {"n_items", "half_width"} - arguments.keys()
-    refuse((absent, "--error: needs --items that it is of, and --half-width"))
-    _refuse(arguments, arguments.keys() - _OF_UNITS, "is not of a plan by --error")
+    refuse((absent, "--error: needs the --items of its study, and --half-width"))
+    _refuse(arguments, arguments.keys() - _OF_UNITS, "cannot be combined with --error")
     from masrel.planning import units_needed
 
     (n_items, *_), half = arguments["n_items"], arguments["half_width"]
@@ -203,8 +220,8 @@ def _plan_units(arguments: dict[str, Any], output: OutputOptions) -> None:
         output,
         document=lambda: {**arguments, "level": level, "n_needed": n},
         text=lambda: (
-            f"{n} are needed for an interval that is expected to be ± {half:g}, where "
-            f"{n_items} give a standard error of {arguments['error']:g}."
+            f"{n} are needed for an expected half-width of {half:g}, if {n_items} "
+            f"give a standard error of {arguments['error']:g}."
         ),
     )
 
@@ -218,7 +235,11 @@ def _plans(
             return (), _of_options(_with_pilot(arguments), report)
         from masrel.lab.cli._study_plans import study_plans
 
-        _refuse(arguments, _NOT_OF_STUDIES, "is not of a study, whose protocol says it")
+        _refuse(
+            arguments,
+            _NOT_OF_STUDIES,
+            ("is not allowed for a study, because its protocol gives it"),
+        )
         return study_plans(folder, arguments, report)
 
 
@@ -227,14 +248,18 @@ def _of_options(arguments: dict[str, Any], report: Report) -> "tuple[Plan, ...]"
 
     ranges = {name: arguments.pop(name) for name in _RANGES if name in arguments}
     if _is_grid(arguments, ranges):
-        _refuse(arguments, ("max_cost",), "is not of a grid, whose rows have costs")
+        _refuse(
+            arguments,
+            ("max_cost",),
+            ("is not allowed for a grid, whose rows have costs"),
+        )
         names = ("prevalences", "executor", "scheduler")
         ranges |= {name: arguments.pop(name) for name in names if name in arguments}
         return plan_grid(Study(**arguments), **ranges, progress=report)
     study = Study(**arguments, **{name: several[0] for name, several in ranges.items()})
     if study.n_items is None or study.n_raters is None:
         return (sample_size(study, progress=report),)
-    _refuse(arguments, ("max_cost",), "needs --items or --raters to be left out")
+    _refuse(arguments, ("max_cost",), "needs either --items or --raters to be left out")
     return (precision(study, progress=report),)
 
 

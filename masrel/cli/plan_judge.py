@@ -15,32 +15,42 @@ from masrel.cli._options import (
 
 
 @click.command("plan --judge")
-@click.option("--epsilon", type=float, help="How much worse the judge may be.")
-@click.option("--raters", "n_humans", type=int, help="Humans who grade every item.")
+@click.option(
+    "--epsilon", type=float, help="How much worse than a human the judge may be."
+)
+@click.option(
+    "--raters", "n_humans", type=int, help="Number of humans who grade every item."
+)
 @click.option(
     "--accuracy",
     type=floats,
     metavar="SHARES",
-    help="How often a human is right, and the judge, as 0.9,0.85; one for both.",
+    help="How often a human and the judge are right, as 0.9,0.85; one number means "
+    "both.",
 )
 @click.option("--categories", "n_categories", default=2, show_default=True)
-@click.option("--power", default=0.8, show_default=True, help="Chance to pass.")
-@click.option("--seed", "rng", default=0, show_default=True)
 @click.option(
-    "--rate", type=float, help="Rate that is expected, in place of --epsilon."
+    "--power", default=0.8, show_default=True, help="Probability that the judge passes."
 )
+@click.option("--seed", "rng", default=0, show_default=True)
+@click.option("--rate", type=float, help="Expected rate, instead of --epsilon.")
 @click.option("--sensitivity", type=float, help="Of the judge, for --rate.")
 @click.option("--specificity", type=float, help="Of the judge, for --rate.")
-@click.option("--half-width", type=float, help="Of the interval of --rate.")
-@click.option("--level", default=0.95, show_default=True, help="Of this interval.")
+@click.option("--half-width", type=float, help="Half-width of the interval of --rate.")
+@click.option(
+    "--level", default=0.95, show_default=True, help="Level of this interval."
+)
 @click.option(
     "--items",
     "n_items",
     type=int,
-    help="How many the judge grades, for --rate; else how many all grade, whose power "
-    "is then told.",
+    help="For --rate, the number of items that the judge grades; otherwise the number "
+    "that all grade, and the power is given.",
 )
-@output_options(json="Write every number here; - prints them, and nothing else.")
+@output_options(
+    json='Write JSON to this file; "-" writes it to standard output and '
+    "prints nothing else."
+)
 def plan_judge(output: OutputOptions, **options: Any) -> None:
     """Say how many items must be labelled for a judge.
 
@@ -65,8 +75,8 @@ def plan_judge(output: OutputOptions, **options: Any) -> None:
         n_labels = judges.labels_needed(**{key: options[key] for key in keys})
         document = {"n_labels": n_labels, **{key: options[key] for key in keys}}
         text = (
-            f"{n_labels} of {options['n_items']} items need a label for an interval "
-            f"of the rate that is expected to be ± {options['half_width']:g}."
+            f"Labels for {n_labels} of {options['n_items']} items give an interval of "
+            f"the rate with an expected half-width of {options['half_width']:g}."
         )
     else:
         human, *judge = options["accuracy"]

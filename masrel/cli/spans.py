@@ -21,39 +21,54 @@ from masrel.ratings._findings import Reading
 
 @click.command("spans", cls=GroupedHelp)
 @click.argument("file", type=InputFile(exists=True, path_type=Path))
-@click.option("--document", metavar="COL", help="Column of the documents; one if none.")
+@click.option(
+    "--document",
+    metavar="COL",
+    help="Column of the documents. Without it there is one document.",
+)
 @click.option("--observer", metavar="COL", help="Column of the observers.")
-@click.option("--label", metavar="COL", help="Column of labels; empty: nothing found.")
-@click.option("--begin", metavar="COL", help="Column of where spans begin.")
-@click.option("--end", metavar="COL", help="Column of the first place behind them.")
+@click.option(
+    "--label",
+    metavar="COL",
+    help="Column of the labels; an empty label means that nothing was found.",
+)
+@click.option("--begin", metavar="COL", help="Column of the place where a span begins.")
+@click.option("--end", metavar="COL", help="Column of the first place after a span.")
 @click.option("--length", metavar="COL", help="Column of the lengths of documents.")
-@click.option("--text", metavar="COL", help="Column of texts, in place of lengths.")
+@click.option("--text", metavar="COL", help="Column of the texts, instead of lengths.")
 @grouped(
     "reading",
     Reading,
     click.option("--delimiter", default="auto", metavar="CHAR", help="Separator."),
-    click.option("--encoding", metavar="NAME", help="Encoding of text."),
+    click.option("--encoding", metavar="NAME", help="Encoding of the text."),
     click.option("--sheet", metavar="NAME", help="Sheet of a workbook."),
     click.option(
         "--from",
         "source",
         type=click.Choice(["label-studio"]),
-        help="Tool whose export it is; a folder is brat's.",
+        help="Tool that exported the file; a folder is read as brat's.",
     ),
 )
 @click.option(
     "--step",
     type=click.FloatRange(min=0.0, min_open=True),
-    help="What places are counted in, such as 0.001 for seconds in milliseconds.",
+    help="Unit of places, such as 0.001 to count seconds in milliseconds.",
 )
-@click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
-@click.option("--show", metavar="DOCUMENT", help="Draw it; else that of most spans.")
+@click.option(
+    "--level", default=0.95, show_default=True, help="Level of the intervals."
+)
+@click.option(
+    "--show",
+    metavar="DOCUMENT",
+    help="Document to draw. Default: the one with most spans.",
+)
 @output_options(
-    json="Write the result here; - prints it, and nothing else, on stdout.",
-    figure="Draw the spans of a document into this .png, .svg or .pdf.",
-    html="Write a page here that needs no other file.",
-    csv="Print every digit as CSV.",
-    latex="Print a LaTeX table.",
+    json='Write JSON to this file; "-" writes it to standard output and prints '
+    "nothing else.",
+    figure="Draw the spans of a document to this .png, .svg or .pdf file.",
+    html="Write a self-contained page.",
+    csv="Print the table as CSV, with all digits.",
+    latex="Print the table as LaTeX.",
 )
 def spans(
     file: Path,

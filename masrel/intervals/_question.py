@@ -50,8 +50,8 @@ PriorName = Literal["uniform", "jeffreys"]
 """Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""
 
 HELD = (
-    "the ordinal metric, which depends on how often each grade was given, was taken "
-    "from all ratings once, as if other ratings would give the same"
+    "the ordinal metric depends on how often each grade was given; it was computed "
+    "once, from all ratings, as if other ratings would give the same metric"
 )
 
 _MAX_PLACES = 1 << 23  # numbers of features that are held at once
@@ -182,7 +182,7 @@ class IntervalProblem:
         if low < self.min_value - ROUNDING or high > 1.0 + ROUNDING:
             notes = (
                 *notes,
-                f"cut at the end of the parameter space [{self.min_value:g}, 1]",
+                f"the interval was cut at {self.min_value:g} or 1",
             )
         return Interval(
             # resamples of items and raters can leave both ends below the space
@@ -231,8 +231,8 @@ def pose_problem(
         refuse(
             (
                 target != "items",
-                "target: counts do not say who rated what, so that an interval "
-                f'generalises to other "items"; got "{target}"',
+                'target: counts do not show who rated what, so it needs "items", '
+                f'got "{target}"',
             )
         )
         ratings = count_ratings(ratings, categories).coded
@@ -247,15 +247,15 @@ def pose_problem(
         (not has_enough, f"{entry.title} needs {needed} raters, got {n_raters}"),
         (
             entry.formula is not None and entry.has_interval and target != "items",
-            f"target: of {entry.title} items are left out or drawn, or clusters of "
-            f'them, so it needs "items"; got "{target}"',
+            f"target: for {entry.title} items, or clusters of items, are left out or "
+            f'drawn, so it needs "items", got "{target}"',
         ),
     )
     formula = entry.formula
     if formula is None:
         raise ParameterError(
-            f"coefficient: {entry.title} is no function of sums over items: there is "
-            "no such interval of it"
+            f"coefficient: this interval is not available for {entry.title}, which is "
+            "not a function of sums over items; leave out the target to get the value"
         )
     if entry.weighted:
         made = declared_weights(weights, coded.categories, declared=coded.declared)
@@ -389,16 +389,16 @@ def cluster_codes(problem: IntervalProblem, clusters: object) -> Integers:
     refuse(
         (
             problem.target != "items",
-            "clusters: what is left out, or drawn anew, is a cluster of items, so "
-            f'target "items"; got "{problem.target}"',
+            'clusters: they are clusters of items, so they need target "items", got '
+            f'"{problem.target}"',
         ),
         (
             not is_row(clusters),
-            f"clusters: needs one label an item, got {type(clusters).__name__}",
+            f"clusters: needs one label per item, got {type(clusters).__name__}",
         ),
         (
             len(labels) != n_items,
-            f"clusters: needs one label an item, {n_items}, got {len(labels)}",
+            f"clusters: needs one label per item, {n_items}, got {len(labels)}",
         ),
     )
     numbers: dict[Hashable, int] = {}
@@ -443,7 +443,8 @@ def warn_small(
     if count == 1:
         what = singular(what)
     note = _CountNote(
-        f"{count} {what}: below {minimum} the interval may cover less than it says"
+        f"{count} {what}: with fewer than {minimum} the true coverage may be below "
+        "the level of the interval"
     )
     warn_caller(note, SmallSampleWarning)
     return (note,)

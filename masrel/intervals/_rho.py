@@ -139,7 +139,7 @@ class RhoPosterior:
         powers, sizes = more[:-1], more[-1]
         if sizes.sum() > _MAX_RATINGS:
             raise ConvergenceError(
-                f"the exact posterior is of at most {_MAX_RATINGS} ratings, got "
+                f"the exact posterior needs at most {_MAX_RATINGS} ratings, got "
                 f"{sizes.sum():.0f}; use the jackknife"
             )
         # the polynomial in A: its powers t, and the logarithms of their coefficients
@@ -214,7 +214,7 @@ def rho_interval(
     shares = (1.0 - level,) if one_sided else (0.5 - 0.5 * level, 0.5 + 0.5 * level)
     posterior = RhoPosterior.of(counts, prior)
     ends = posterior.quantiles(*shares)
-    bound = "the bound rests on the prior, too" if one_sided else ""
+    bound = "the bound depends on the prior, too" if one_sided else ""
     notes: tuple[str, ...] = ()
     if why := bound or where_the_prior_weighs(counts):
         others = [
@@ -250,21 +250,21 @@ def nothing_to_learn(problem: IntervalProblem) -> str | None:
         return None
     if np.isnan(problem.v).any():
         return "the scale has no such weights"
-    return None if problem.v.any() else "the weights count nothing as disagreement"
+    return None if problem.v.any() else "the weights treat nothing as disagreement"
 
 
 def where_the_prior_weighs(counts: NDArray[np.int64]) -> str:
     """Return why counts (n_items, n_categories) leave the prior a say, or nothing."""
     n_items = int((counts.sum(axis=1) >= 2).sum())
     if counts.any(axis=0).sum() == 1:
-        what = "all ratings are in one category"
+        what = "all ratings are in one category, so"
     elif ((counts > 0).sum(axis=1) <= 1).all():
-        what = "agreement is perfect in these data"
+        what = "agreement is perfect in these data, so"
     elif n_items < _FEW_ITEMS:
-        what = "1 item is few" if n_items == 1 else f"{n_items} items are few"
+        what = "with only 1 item" if n_items == 1 else f"with only {n_items} items"
     else:
         return ""
-    return f"{what}, so the prior weighs"
+    return f"{what} the prior affects this interval"
 
 
 def prior_note(why: str, *answers: tuple[Sequence[float], str]) -> str:
@@ -274,7 +274,7 @@ def prior_note(why: str, *answers: tuple[Sequence[float], str]) -> str:
         for ends, words in answers
     )
     return _LongNote(
-        f"{why}: {here}, but {there}", f"{why} (--explain says by how much)"
+        f"{why}: it is {here}, but {there}", f"{why}; --explain shows how much"
     )
 
 
@@ -285,8 +285,8 @@ def extended(problem: IntervalProblem, interval: Interval) -> Interval:
         return interval
     name, end = ("lower", low) if value < low else ("upper", high)
     note = (
-        f"the {name} end is extended from {end:.3f}, that of the posterior, to the "
-        f"estimate, {value:.3f}, which lies outside"
+        f"the {name} limit of the posterior, {end:.3f}, is extended to the estimate, "
+        f"{value:.3f}, which lies outside"
     )
     return replace(
         interval,

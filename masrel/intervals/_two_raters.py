@@ -175,7 +175,7 @@ def table_quantiles(
         again = [fewer.probability(end) for end in ends]
         if np.allclose(again, shares, rtol=_SETTLED, atol=0.0):
             return posterior, ends, fewer
-    raise ConvergenceError("the quadrature of the posterior has not settled")
+    raise ConvergenceError("the quadrature of the posterior did not converge")
 
 
 def grid_nodes(
@@ -252,7 +252,7 @@ def table_interval(
         of_high = 0.0 if one_sided else posterior.quantile_error(high)
         errors = (posterior.quantile_error(low), of_high)
     n_single = problem.n_items - problem.n_paired_items
-    notes = [f"left out, items of a single rating: {n_single}"] * bool(n_single)
+    notes = [f"items with a single rating, left out: {n_single}"] * bool(n_single)
     counts = problem.item_counts()
     if why := where_the_prior_weighs(counts[counts.sum(axis=1) > 1]):
         # another prior that is as reasonable
@@ -300,7 +300,7 @@ def table_refusal(problem: IntervalProblem) -> str:
         )
     if problem.entry.metric == "ordinal":
         return (
-            "metric: ordinal depends on the ratings, and so has no posterior; use the "
-            "jackknife or the bootstrap"
+            "metric: there is no posterior for ordinal, which depends on the ratings; "
+            "use the jackknife or the bootstrap"
         )
     return ""

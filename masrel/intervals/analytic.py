@@ -160,8 +160,9 @@ def analytic(
     refuse(
         (
             target != "items",
-            'target: the delta method generalises to other items only, so "items"; for '
-            f'other raters, or both, use the jackknife; got "{target}"',
+            "target: the delta method generalises to other items only: needs "
+            f'"items", got "{target}"; for other raters, or both, use the '
+            "jackknife",
         ),
         (
             clusters is not None and convention is not None,
@@ -243,7 +244,7 @@ def _why_undefined(
     if not error > 0.0:
         return NO_SPREAD
     if lowest is not None and not lowest < estimate.value < 1.0:
-        return "the estimate is not inside the ends of the parameter space"
+        return "the estimate is at an end of the parameter space"
     return None
 
 
@@ -337,8 +338,9 @@ def _error_by(
     if function is None or (function is _null and not problem.unweighted):
         with_weights = "" if function is None else " with weights"
         raise ParameterError(
-            f'convention: "{convention}" has no error of {problem.entry.title}'
-            f"{with_weights}; it has one of {', '.join(_ERRORS[convention])}"
+            f'convention: "{convention}" has no error for '
+            f"{problem.entry.title}{with_weights}; it has one for "
+            f"{', '.join(_ERRORS[convention])}"
         )
     is_defined = estimate.reason is None and estimate.n_items > 1
     return function(problem, estimate) if is_defined else math.nan

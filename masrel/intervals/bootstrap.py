@@ -168,8 +168,8 @@ def bootstrap(
         ),
         (
             kind == "studentized" and target != "items",
-            'kind: "studentized" needs the standard error of every resample, which '
-            'there is for target "items" alone',
+            'kind: "studentized" needs the standard error of every resample, so it '
+            'needs target "items"',
         ),
     )
     problem = pose_problem(
@@ -195,7 +195,7 @@ def bootstrap(
         )[0]
         values = partial(_studentized, problem, units, error)
         if not error > ROUNDING:
-            reason = "the estimate has no standard error to studentize by"
+            reason = "the estimate has no standard error to studentize with"
     if reason is not None:
         return problem.undefined(reason, method=method, unit=unit)
     resamples, n_distinct, seed = _resampled(units, values, exact, n_resamples, rng)
@@ -321,8 +321,8 @@ def _rater_units(problem: IntervalProblem) -> _Units:
     formula, v, (fewest, most) = problem.formula, problem.v, problem.entry.n_raters
     if isinstance(v, Distances):
         raise ParameterError(
-            f"target: raters of {len(v)} different grades are left out, but not "
-            "resampled; use the jackknife"
+            f"target: raters cannot be resampled with {len(v)} different grades; use "
+            "the jackknife, which leaves them out"
         )
     if formula.resampled is None or most == fewest:
         raise ParameterError(
@@ -406,13 +406,16 @@ def _ends(
     # Application.
     values, value = resamples.values, problem.value
     if not (values.size and values[-1] - values[0] > ROUNDING):
-        return "every resample gives the same value or none, so there is no spread"
+        return "there is no spread, because every resample gives the same value or none"
     tail, share = 0.5 * (1.0 - problem.level), 0.5
     positions, pulls = [tail, 1.0 - tail], [0.0, 0.0]
     if kind == "bca":
         share = resamples.share_below(value)
         if not 0.0 < share < 1.0:
-            return "all resamples lie on one side of the estimate, so BCa has no bias"
+            return (
+                "BCa has no bias correction, because all resamples lie on one side of "
+                "the estimate"
+            )
         normal, skew = NormalDist(), _acceleration(units)
         bias = normal.inv_cdf(share)  # z0, (14.14) of [1]
         for k, z in enumerate(map(normal.inv_cdf, positions)):
@@ -458,21 +461,21 @@ def _notes(
     notes = []
     if resamples.n_undefined and resamples.n_drawn is None:
         notes.append(
-            f"undefined, and left out: {resamples.n_undefined} of {n_distinct} "
-            f"distinct resamples, of probability {resamples.p_undefined:.2g}"
+            f"undefined and left out: {resamples.n_undefined} of {n_distinct} "
+            f"distinct resamples, with probability {resamples.p_undefined:.2g}"
         )
     if one_value:
         notes.append(
             _Caution(
-                "both ends are one value, which many resamples have; that does not "
-                "make it certain"
+                "both limits are the same value, which many resamples have; this does "
+                "not make it certain"
             )
         )
     infinite = float(resamples.weights[np.isinf(resamples.values)].sum())
     if infinite:  # of ratios alone
         notes.append(
-            f"resamples of probability {infinite:.2g} have a standard error of 0: "
-            "their studentized values are infinite"
+            f"resamples with probability {infinite:.2g} have a standard error of 0, "
+            "so their studentized values are infinite"
         )
     return tuple(notes)
 

@@ -100,8 +100,9 @@ _DRAWS, _TABLE_DRAWS, _SEED = 2_000, 4_000, 1  # always the same, so that they r
 _MANY = 2_000  # items, above which the model's polynomials take long
 _MANY_RATERS = 10  # among whom careless ones are seldom missing
 _CARELESS = _Caution(
-    "careless raters are not covered, of whom so few may include none: where one rater "
-    "in five is careless, 95 % intervals of 5 raters held in about 70 % of studies"
+    "this interval makes no allowance for careless raters when the sample has none; "
+    "in simulations with one careless rater in five, 95 % intervals from 5 raters "
+    "held the truth in about 70 % of studies"
 )
 
 
@@ -191,9 +192,8 @@ def estimate(
     refuse(
         (
             is_own and there_is not in (target, "both"),
-            f"target: the interval of {entry.title} generalises to other "
-            f'{_POPULATIONS[there_is]}, which is "{there_is}", and it has no other; '
-            f'got "{target}"',
+            f"target: {entry.title} generalises to other {_POPULATIONS[there_is]}: "
+            f'needs target "{there_is}", got "{target}"',
         ),
         (
             clusters is not None and method == "posterior",
@@ -229,7 +229,7 @@ def estimate(
         interval, why = _choose_interval(ask(entry, ratings), rule, clusters)
         by_rule = f"{interval.method}, chosen by {rule.name}"
         interval = replace(interval, target=target, method=by_rule)
-        chosen = _LongNote(f"chosen for {_population(interval)}: {why}")
+        chosen = _LongNote(f"method chosen for {_population(interval)}: {why}")
         interval = replace(interval, notes=(chosen, *interval.notes))
     else:
         function = {
@@ -255,8 +255,8 @@ def _with_own_target(result: Estimate, target: Target, rule: str) -> Estimate:
     if interval is None or interval.target == target:
         return result
     note = _Caution(
-        f"asked for other {_POPULATIONS[target]}: there is this interval, for "
-        f"other {_POPULATIONS[interval.target]}, and so rather too wide"
+        f"the only interval available is for other {_POPULATIONS[interval.target]}, "
+        f"so it is rather too wide for other {_POPULATIONS[target]}"
     )
     return replace(result, interval=replace(interval, notes=(*interval.notes, note)))
 
@@ -286,12 +286,12 @@ def _choose_interval(
         if left_out.reason is None and rare:
             notes = warn_small(outside, _SEVERAL, _OUTSIDE)
             left_out = replace(left_out, notes=(*notes, *left_out.notes))
-        return left_out, "clusters left out one at a time, on a logit scale"
+        return left_out, "clusters are left out one at a time, on a logit scale"
     if problem.is_too_large and problem.target == "items":
-        why = "too many different grades to leave items out one by one"
+        why = "there are too many different grades to leave items out one by one"
         return _by_error(problem), why
     if problem.entry.shape == "pairs":
-        why = "items leave with the pairs of all their raters"
+        why = "an item is left out with the pairs of all its raters"
         return _leave_out(problem).interval(), why
     if problem.n_paired_items == 0:
         return _leave_out(problem).interval(), "no item has ratings of two raters"
@@ -306,11 +306,14 @@ def _choose_interval(
     if interval is None:
         return _jackknife_with_spread(problem)
     if few:
-        return interval, f"few items ({problem.n_paired_items}), where it covers best"
+        return (
+            interval,
+            f"it has the best coverage with few items ({problem.n_paired_items})",
+        )
     # below so many no method covers everywhere
     notes = warn_small(outside, 5 if problem.unweighted else _SEVERAL, _OUTSIDE)
     what = singular(_OUTSIDE) if outside == 1 else _OUTSIDE
-    why = f"categories are rare ({outside} {what}), where it covers best"
+    why = f"it has the best coverage when categories are rare ({outside} {what})"
     return replace(interval, notes=(*notes, *interval.notes)), why
 
 
@@ -328,10 +331,10 @@ def _jackknife_with_spread(problem: IntervalProblem) -> tuple[Interval, str]:
         if modelled or target == "items":
             interval = _posterior(problem, "usual")
         if interval is None:
-            return left_out.interval(), "the spread of the units left out"
-        return interval, "leaving any out says next to nothing, so that a model must"
+            return left_out.interval(), "it uses the spread of the units left out"
+        return interval, "leaving any out changes almost nothing, so a model is needed"
     if target == "raters":
-        return left_out.interval(), "raters left out, one at a time"
+        return left_out.interval(), "raters are left out one at a time"
     lowest, per_item = problem.entry.lowest, n_ratings / n_items
     if modelled and per_item > 1.0:
         # An intraclass correlation of r raters is at least -1/(r - 1): its logit is
@@ -340,7 +343,7 @@ def _jackknife_with_spread(problem: IntervalProblem) -> tuple[Interval, str]:
     interval = left_out.interval(lowest=lowest)
     if modelled and n_items < _SEVERAL:
         interval = _lift(problem, interval)
-    return interval, "items left out one at a time, on a logit scale"
+    return interval, "items are left out one at a time, on a logit scale"
 
 
 def _outside_commonest(problem: IntervalProblem) -> tuple[int, bool]:
@@ -413,9 +416,9 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     if not high > interval.high:
         return interval
     note = (
-        f"the upper end, {interval.high:.3f}, is lifted halfway to that of the "
-        f"Dirichlet-multinomial posterior, {high:.3f}: with few items an estimate "
-        "that is low by chance has a low error, too"
+        f"the upper limit is halfway between the jackknife's, {interval.high:.3f}, "
+        f"and the Dirichlet-multinomial posterior's, {high:.3f}: with few items, an "
+        "estimate that is low by chance has too small an error"
     )
     return replace(
         interval,
@@ -445,7 +448,7 @@ def _other_items_and_raters(
     common = student_t(problem.level, df) ** 2 * _variance_of_cells(problem)
     parts = (replace(problem, target=of, max_df=df) for of in ("items", "raters"))
     items, raters = (_choose_interval(of, rule)[0] for of in parts)
-    why = "what items left out and raters left out move"
+    why = "it combines the changes from leaving out items and from leaving out raters"
     for part in (items, raters):
         if part.reason is not None:
             return part, why

@@ -147,7 +147,7 @@ def difference(
     width = 1.0 - min(problem.min_value for problem in compared.problems)
     low, high = max(value - half, -width), min(value + half, width)
     if (low, high) != (value - half, value + half):
-        notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)
+        notes += (f"the interval was cut at {-width:g} or {width:g}",)
     interval = Interval(
         low=low,
         high=high,
@@ -296,9 +296,9 @@ def _compare(
     unit = "item" if clusters is None else "cluster"
     reason = one.reason or other.reason
     if reason is None and math.isnan(variance):
-        reason = f"with one {unit} left out an estimate is undefined"
+        reason = f"an estimate is undefined when one {unit} is left out"
     elif reason is None and variance == 0.0:
-        reason = f"leaving out any {unit} leaves the difference as it is"
+        reason = f"the difference stays the same whichever {unit} is left out"
     estimate = Estimate(
         coefficient=f"difference of {one.coefficient}",
         weights=one.weights,
@@ -332,8 +332,8 @@ def _check_same_items(problems: Sequence[IntervalProblem], clusters: object) -> 
     refuse(
         (
             clusters is None and is_in_one.any(),
-            "design: dependent ratings need both for every item, row "
-            f"{int(is_in_one.argmax())} has ratings in one of them only",
+            "design: dependent ratings need every item in both, but row "
+            f"{int(is_in_one.argmax())} has ratings in only one",
         ),
         error=RatingsError,
     )
@@ -342,11 +342,11 @@ def _check_same_items(problems: Sequence[IntervalProblem], clusters: object) -> 
 def _checked_pair(clusters: object) -> Sequence[object]:
     if not isinstance(clusters, Sequence) or len(clusters) != 2:
         raise ParameterError(
-            "clusters: independent ratings need a pair of sequences, one label an item"
+            "clusters: independent ratings need a pair of sequences, one label per item"
         )
     if all(map(is_row, clusters)) and (shared := set(clusters[0]) & set(clusters[1])):
         raise ParameterError(
-            "clusters: independent ratings need other clusters, got "
+            "clusters: independent ratings need different clusters, got "
             f"{min(map(str, shared))!r} in both"
         )
     return clusters
@@ -587,8 +587,8 @@ def differences(
         )
     if reason is None and not errors.any():
         reason = (
-            f"leaving out any {unit.removesuffix('s')} leaves all differences as they "
-            "are"
+            f"all differences stay the same whichever {unit.removesuffix('s')} is "
+            "left out"
         )
     elif reason is None and simultaneous == "scheffe":
         reason = _too_few(len(each), n_units)
@@ -640,8 +640,8 @@ def _why_undefined(
     for name, values in zip(names, without, strict=True):
         if np.isnan(values).any():
             return (
-                f"{name}: with one {unit.removesuffix('s')} left out the estimate is "
-                "undefined"
+                f"{name}: the estimate is undefined when one {unit.removesuffix('s')} "
+                "is left out"
             )
     return None
 
@@ -733,7 +733,10 @@ def _hotelling(values: Floats, v: Floats, n: int, reason: str | None) -> Signifi
         # C takes each from the first
         sizes, axes = np.linalg.eigh(v[1:, 1:] - v[1:, :1] - v[:1, 1:] + v[0, 0])
         if sizes[0] <= _FLAT * np.abs(v).max():
-            reason = "some of the coefficients never differ, or always as much"
+            reason = (
+                "some of the coefficients never differ, or always differ by the same "
+                "amount"
+            )
         else:
             t_squared = float(((axes.T @ (values[1:] - values[0])) ** 2 / sizes).sum())
             statistic = t_squared * (n - g + 1.0) / ((n - 1.0) * (g - 1.0))
@@ -798,7 +801,7 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
     if len(kinds := {(e.coefficient, e.weights): None for e in checked}) > 1:
         of_kinds = (f"{name} ({weights})" for name, weights in kinds)
         raise ParameterError(
-            f"estimates: needs one coefficient of all, got {', '.join(of_kinds)}"
+            f"estimates: needs the same coefficient for all, got {', '.join(of_kinds)}"
         )
     n_items = sum(e.n_items for e in checked)
     test = partial(
@@ -879,7 +882,7 @@ def donner_test(
     test = partial(_tested, "donner_test", _SAME, "chi-squared", df, n)
     for place, (both, one, neither) in enumerate(tables):
         if one == 0 and 0 in (both, neither):
-            return test(reason=f"group {place}: its ratings are of one category")
+            return test(reason=f"group {place}: all its ratings are in one category")
     p = (2.0 * observed[:, 0] + observed[:, 1]) / (2.0 * n_items)
     between = p * (1.0 - p)
     kappa = 1.0 - observed[:, 1] / (2.0 * n_items * between)
@@ -893,7 +896,9 @@ def donner_test(
     )
     expected = n_items[:, None] * shares
     if not (expected > 0.0).all():
-        return test(reason="both raters of all groups agree on every item, or never")
+        return test(
+            reason="in all groups the two raters agree on every item, or on none"
+        )
     return test(statistic=float(((observed - expected) ** 2 / expected).sum()))
 
 

@@ -220,22 +220,21 @@ def diagnose(
     refuse(
         (
             target not in ("items", None),
-            "target: a rater, a pair and a category are those of these ratings, so "
-            f'"items", or None for no intervals; got {target!r}',
+            'target: intervals generalise to other items: needs "items", or None '
+            f"for no intervals, got {target!r}",
         ),
         (
             entry.shape != "ratings",
-            f"coefficient: needs one of several raters, and {entry.title} is of each "
-            "rater's grades of two sessions",
+            f"coefficient: needs one that compares raters, but {entry.title} compares "
+            "each rater's grades of two sessions",
         ),
     )
     coded = entry.code(ratings, categories)
     refuse(
         (
             coded.n_categories > MANY,
-            f"ratings: a table of confusions needs at most {MANY} different grades, "
-            f"got {coded.n_categories}; for measurements there are limits of agreement "
-            "and ICC",
+            f"ratings: a confusion table needs at most {MANY} different grades, got "
+            f"{coded.n_categories}; for measurements use limits of agreement or an ICC",
         )
     )
     pose = partial(

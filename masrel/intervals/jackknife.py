@@ -167,15 +167,15 @@ def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _L
         freq = problem.freq if unit == "items" else np.ones(len(values), dtype=np.int64)
         variance += _variance_of(values, n, freq)
         if np.isnan(values).any():
-            reason = f"with one of the {unit} left out the estimate is undefined"
+            reason = f"the estimate is undefined when one of the {unit} is left out"
             break
         # Satterthwaite's degrees for a sum would lie above the fewer ones.
         df = min(df, n - 1)
         notes += warn_small(n, 5 if unit == "raters" else 10, unit, int(freq.sum()))
     if reason is None and not variance > 0.0:
         reason = (
-            f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
-            "is, so the jackknife cannot say how uncertain it is"
+            f"the estimate stays the same whichever of the {' or '.join(units)} is "
+            "left out, so the jackknife cannot show how uncertain it is"
         )
     return _LeftOut(
         problem=problem,

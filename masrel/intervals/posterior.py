@@ -213,8 +213,8 @@ def _checked_model(
     refuse(
         (
             problem.target != "items",
-            "target: a posterior generalises to other items, so "
-            f'"items"; for other raters use the jackknife; got "{problem.target}"',
+            'target: a posterior generalises to other items: needs "items", got '
+            f'"{problem.target}"; for other raters use the jackknife',
         ),
         (
             problem.entry.shape == "pairs" or problem.entry.has_interval,

@@ -20,7 +20,7 @@ from masrel.agreement._engine import Floats, Integers, check_level, undefined
 PairedTest = Literal["exact", "score", "t"]
 """Ways to test whether p_b - p_c is less than a bound."""
 
-NO_CHANGE = "0/0: what the hypothesis says is what was counted, and it has no variance"
+NO_CHANGE = "0/0: the counts are exactly those of the hypothesis and have no variance"
 
 _TIED = 1e-9  # statistics nearer than this are the same
 _PER_SD = 2.0  # places of the nuisance to a standard error of its estimate
@@ -131,7 +131,7 @@ def score_test(
     check_count("b", b, 0)
     check_count("c", c, 0)
     check_count("n", n)
-    refuse((b + c > n, f"n: needs at least the {b} + {c} of b and c, got {n}"))
+    refuse((b + c > n, f"n: needs at least b + c = {b} + {c}, got {n}"))
     check_share("delta", delta, -1.0)
     check_level(level)
     b, c, n = int(b), int(c), int(n)

@@ -53,7 +53,7 @@ from masrel.judges._paired import (
 )
 
 EPSILONS: Mapping[str, float] = {"expert": 0.2, "skilled": 0.15, "crowd": 0.1}
-"""By how much a human may be better, by who the humans are (Calderon et al. 2025)."""
+"""How much better a human may be, by kind of human (Calderon et al. 2025)."""
 
 
 class Grades(Protocol):
@@ -65,19 +65,21 @@ class Grades(Protocol):
 
 
 ScoreName = Literal["accuracy", "neg_rmse"]
-"""How near a grade is to those of others: how many are equal, or -√(mean square)."""
+"""Closeness of a grade to those of others: how many are equal, or -√(mean square)."""
 
 Score = ScoreName | tuple[WeightsLike, Sequence[Label]]
-"""A name, or weights of agreement and the declared categories that they are of."""
+"""A name, or weights of agreement with the declared categories."""
 
 _Bools = NDArray[np.bool_]
 
 _EXACT_UP_TO = 2500  # items, of which an exact p-value takes some 50 ms
 _FEW_CLUSTERS = 20
 _ROUNDING = 1e-12  # share of a sum of weights, or an error, that is none
-_NO_CLUSTERS = "0/0: there is one cluster, or no difference in any"
-_NO_ITEM = "without one of what is left out a human has no item"
-_AT_THE_END = "it is at the end of its scale, where nothing shows what others would be"
+_NO_CLUSTERS = "0/0: there is only one cluster, or no difference in any"
+_NO_ITEM = "a human has no item when one of the units is left out"
+_AT_THE_END = (
+    "it is at the end of its scale, so there is no information about its uncertainty"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -399,7 +401,10 @@ class _Graded:
         codes, _ = label_codes([list(map(of.get, self.items))], None)
         item = self.items[int(codes[0].argmin())]
         refuse(
-            ((codes < 0).any(), f"clusters: item {item!r} needs one, got nothing"),
+            (
+                (codes < 0).any(),
+                f"clusters: item {item!r} needs a cluster, got nothing",
+            ),
             error=RatingsError,
         )
         return np.asarray(codes[0], dtype=np.int64)
@@ -422,8 +427,8 @@ def _graded(
     refuse(
         (
             not does_count.any(),
-            f"{listed(judges)}: needs items that two humans have graded, too; none of "
-            f"{len(items)} is, such as {shown(next(iter(items), None))}",
+            f"{listed(judges)}: needs items that two humans have graded, too; there "
+            f"are none among {len(items)}, such as {shown(next(iter(items), None))}",
         ),
         error=RatingsError,
     )
@@ -619,7 +624,7 @@ def advantage(
         # of n units none was otherwise: Clopper and Pearson's interval
         share = (0.5 - 0.5 * level) ** (1.0 / (rest.df + 1.0))
         low, high = (share, 1.0) if value else (0.0, 1.0 - share)
-        method = f"exact, all {interval.unit} being alike"
+        method = f"exact, because all {interval.unit} are the same"
     else:
         reason = undefined("the interval of the advantage", _AT_THE_END)
     return Estimate(

@@ -343,8 +343,8 @@ def _other_starts(
     if gain <= _HIGHER:
         return None, notes
     note = (
-        f"not the highest maximum: {n_higher} of {_N_STARTS} other starts end higher, "
-        f"the best by {gain:.3g} in log-likelihood"
+        f"this is this is not the highest maximum: {n_higher} of {_N_STARTS} other "
+        f"starts end higher, the best by {gain:.3g} in log-likelihood"
     )
     return other, (note, *notes)
 
@@ -365,14 +365,14 @@ def _result(
     shares, posterior = fits.shares[0], fits.posterior[votes.pattern, 0]
     notes += _doubts(votes, posterior, has_none)
     if fits.move > _SETTLED:
-        notes = (f"EM had not settled after {_MAX_STEPS} steps", *notes)
+        notes = (f"EM did not converge in {_MAX_STEPS} steps", *notes)
     correct = np.diagonal(confusion, axis1=1, axis2=2)
     correct = np.where(shares * len(posterior) < _NO_ITEM, 0.0, correct)
     reason = None
     if votes.counts.sum(axis=1).max() < 3:
-        reason = "no item has three ratings, and fewer do not identify the model"
+        reason = "no item has three ratings, and with fewer the model is not identified"
     elif len(votes.raters) < 3:
-        reason = "two raters do not identify the model"
+        reason = "the model is not identified with two raters"
     return DawidSkene(
         categories=votes.categories,
         raters=votes.raters,
@@ -398,11 +398,15 @@ def _doubts(votes: _Votes, posterior: Floats, has_none: Any) -> tuple[str, ...]:
     )
     return (
         *(
-            f"no item is most probably of class {name!r}"
+            f"class {name!r} is not the most probable class of any item"
             for k, name in enumerate(names)
             if k not in best
         ),
-        *([f"errors unknown, no item graded: {pairs}"] if pairs else []),
+        *(
+            [f"errors are unknown, because no item was graded: {pairs}"]
+            if pairs
+            else []
+        ),
     )
 
 
@@ -523,11 +527,11 @@ def _cautions(fit: DawidSkene, n_switched: int, n_draws: int) -> tuple[str, ...]
     """Warn where raters tell classes apart so little that intervals may be short."""
     certainty = float(fit.posterior.max(axis=1).mean())
     doubts = {
-        f"the class of an item has a probability of {certainty:.2f} on average: "
-        f"below {_CERTAIN} the interval may cover less than it says": certainty
-        < _CERTAIN,
-        f"classes exchanged places in {n_switched} of {n_draws} draws: raters "
-        "hardly tell them apart": n_switched > _MANY_SWITCHED * n_draws,
+        f"the class of an item has a probability of {certainty:.2f} on average; if it "
+        f"is below {_CERTAIN}, the true coverage may be below the level of the "
+        "interval": certainty < _CERTAIN,
+        f"classes were exchanged in {n_switched} of {n_draws} draws, because raters "
+        "hardly distinguish them": n_switched > _MANY_SWITCHED * n_draws,
     }
     cautions = tuple(text for text, is_so in doubts.items() if is_so)
     for caution in cautions:
@@ -694,12 +698,12 @@ def effective_number(errors: object, *, level: float = 0.95) -> EffectiveNumber:
     if math.isnan(rho):
         reason = undefined(
             "the effective number of judges",
-            "0/0: of every two judges, one makes no error or only errors",
+            "0/0: in every pair of judges, one makes no errors or only errors",
         )
     elif error == 0.0:
         reason = undefined(
             "the interval of the effective number of judges",
-            "leaving out any of the items changes nothing",
+            "the value stays the same whichever item is left out",
         )
     value = k / float(effects[0])
     factor = math.exp(student_t(level, n_items - 1) * error)
@@ -731,8 +735,8 @@ def _read_errors(errors: Any) -> tuple[list[object], Floats]:
     refuse(
         (
             not (2 <= len(table) <= table.shape[1] and np.isin(table, (0, 1)).all()),
-            "errors: needs one row of 0 and 1 a judge, at least two judges and no "
-            f"fewer items than judges, got {shown(errors)}",
+            "errors: needs one row of 0 and 1 per judge, at least two judges, and at "
+            f"least as many items as judges, got {shown(errors)}",
         ),
         error=RatingsError,
     )

@@ -140,9 +140,10 @@ def judge_plan(
         refuse(
             (
                 plan.difference >= epsilon or low * _GROWTH > _MOST,
-                f"epsilon: needs to be more than {plan.difference:.3f}, by which a "
-                f"human's share exceeds the judge's; with {low} items the judge passes "
-                f"in {plan.power:.0%} of studies, got {epsilon:g}",
+                f"epsilon: needs to be more than {plan.difference:.3f}, the "
+                f"difference between a human's share and the judge's; with {low} "
+                f"items the judge passes in {plan.power:.0%} of studies, got "
+                f"{epsilon:g}",
             )
         )
         plan = at(math.ceil(low * _GROWTH))

@@ -131,8 +131,8 @@ def position_bias(
         pair = verdicts.setdefault((item, min(a, b), max(a, b)), [-1, -1])
         if pair[a > b] >= 0:
             raise RatingsError(
-                f"ratings: row {place}: the same pair in the same order again; runs "
-                "that repeat it need other items"
+                f"ratings: row {place}: the same pair occurs again in the same order; "
+                "give repeated runs different items"
             )
         pair[a > b] = 1 + int(of_first if a > b else -of_first)
     both = [pair for pair in verdicts.values() if min(pair) >= 0]
@@ -145,7 +145,7 @@ def position_bias(
     gains, losses = int(np.triu(table, 1).sum()), int(np.tril(table, -1).sum())
     interval = score_test(gains, losses, n_pairs, level=level)
     is_several = len({item for item, *_ in verdicts}) < len(verdicts)
-    note = "items have several pairs, which count as if they were independent"
+    note = "items have several pairs, which are treated as independent"
     stays = n_pairs - gains - losses
     return PositionBias(
         table=table,

@@ -38,12 +38,15 @@ _ENOUGH = {"labels": 10, "numbers": 50, "z": 200, "of_both_kinds": 20, "of_a_kin
 # Why an interval lies below 0, or above 1
 _OUTSIDE = {
     "rogan_gladen": (
-        "the judge passes fewer items than its false passes alone would give: its "
-        "errors in the labelled items are not those in the others",
-        "the judge passes more items than if all deserved it: its errors in the "
-        "labelled items are not those in the others",
+        "the judge passes fewer items than its false passes alone would give, so its "
+        "errors in the labelled items differ from those in the others",
+        "the judge passes more items than if all deserved it, so its errors in the "
+        "labelled items differ from those in the others",
     ),
-    "prediction_powered": ("the judge grades labelled items unlike the others",) * 2,
+    "prediction_powered": (
+        ("the judge grades labelled items differently from the others"),
+    )
+    * 2,
 }
 
 
@@ -150,11 +153,9 @@ def corrected_rate(
     RateEstimate
         Rogan and Gladen's rate with Lang and Reiczigel's interval.
 
-    Raises
-    ------
-    ParameterError
-        If a share is outside [0, 1], a number below 1, or sensitivity and specificity
-        add up to 1 or less: such a judge tells nothing of the rate.
+    Raises ------ ParameterError If a share is outside [0, 1], a number below 1, or
+    sensitivity and specificity add up to 1 or less, with which the judge gives no
+    information about the rate.
 
     Warns
     -----
@@ -190,8 +191,7 @@ def corrected_rate(
         refuse(
             (
                 not isinstance(pair, tuple | list) or len(pair) != 2,
-                f"{name}: needs a share and the number of items that it is of, got "
-                f"{shown(pair)}",
+                f"{name}: needs a share and its number of items, got {shown(pair)}",
             )
         )
         check_share(name, pair[0])
@@ -200,8 +200,8 @@ def corrected_rate(
     refuse(
         (
             total <= 1.0,
-            f"sensitivity, specificity: need a sum above 1, got {total:.4g}: such a "
-            "judge tells nothing of the rate",
+            f"sensitivity, specificity: need a sum above 1, got {total:.4g}, with "
+            "which the judge gives no information about the rate",
         )
     )
     return _corrected(rate, n, sensitivity, specificity, level)
@@ -290,8 +290,8 @@ def prediction_powered_mean(
     n, m = len(y), len(pool)
     refuse(
         (len(f) != n, f"predictions: needs one for each of {n} labels, got {len(f)}"),
-        (n < 2, f"labels: needs those of 2 items or more, got {n}"),
-        (m < 1, "unlabelled: needs the prediction of an item or more, got none"),
+        (n < 2, f"labels: needs labels of 2 items or more, got {n}"),
+        (m < 1, "unlabelled: needs at least one prediction, got none"),
         error=RatingsError,
     )
     is_z = method == "z"
@@ -369,12 +369,9 @@ def rate_estimates(
     RatingsError
         If fewer than 2 items have both a label and a grade of the judge.
 
-    Warns
-    -----
-    UndefinedStatisticWarning
-        If the labelled items are all of one kind, or the judge does no better in them
-        than chance: the rate of Rogan and Gladen is ``nan``. Or if its interval lies
-        outside [0, 1].
+    Warns ----- UndefinedStatisticWarning If all labelled items have the same label, or
+    the judge does no better in them than chance: the rate of Rogan and Gladen is
+    ``nan``. Or if its interval lies outside [0, 1].
 
     See Also
     --------
@@ -537,8 +534,8 @@ def labels_needed(
     refuse(
         (
             widths[-1] > half_width,
-            f"half_width: needs {widths[-1]:.4g} or more, which labels of all "
-            f"{n_items} items give, got {half_width}",
+            f"half_width: needs {widths[-1]:.4g} or more, the half-width with labels "
+            f"of all {n_items} items, got {half_width}",
         )
     )
     # one more than the last number that is too few: cutting may narrow a wide interval
@@ -669,7 +666,7 @@ def _corrected(
     ends = _lang_reiczigel(rate, n, sensitivity, specificity, _quantile(level))
     reason = None
     if not (m1 and m0):
-        reason = "the labelled items are all of one kind"
+        reason = "all labelled items have the same label"
     elif q1 + q0 <= 1.0:
         reason = "the judge does no better than chance in the labelled items"
     are_enough = m1 + m0 >= _ENOUGH["of_both_kinds"]

@@ -65,7 +65,7 @@ _MOST_NAMED = 8  # raters whose grades stand one after the other
 _TITLES = {
     "compare": "Agreement of groups in",
     "diagnose": "Raters, pairs and grades in",
-    "judge": "Judges beside the humans in",
+    "judge": "Judges and humans in",
     "limits": "Limits of agreement of the raters in",
 }
 
@@ -78,8 +78,8 @@ _PICTURED = {
 }
 
 _NO_INTERVAL = (
-    'No interval was asked for. --target items (in Python target="items") gives one '
-    "for other items like these, raters or both for other raters."
+    "No interval was asked for. To generalise to other items, add --target items (in "
+    'Python target="items"); to other raters, raters or both.'
 )
 
 
@@ -208,7 +208,7 @@ def _picture_sections(
             blocks[:0] = [
                 table for part in parts if (table := _items_table(part)) is not None
             ]
-        text = f"Of the first {_MOST_PARTS} of {len(every)} groups."
+        text = f"Only the first {_MOST_PARTS} of {len(every)} groups are shown."
         some = [Paragraph(text=text, absent=True)] * (len(every) > _MOST_PARTS)
         if blocks:
             yield Section(name=name, title=title, blocks=(*some, *blocks))
@@ -252,7 +252,7 @@ def _items_table(seen: PartSeen) -> Table | None:
         notes=(
             "Disagreement: of the pairs of ratings of an item, "
             + (
-                "the share that differs."
+                "the share that differ."
                 if seen.distance == "identity"
                 else f"how far they differ on average ({by})."
             ),
@@ -329,8 +329,8 @@ def study_page(
     stamp = SIMULATED if "simulated" in first.data else ""
     drawing = Drawing(
         name="reliability",
-        caption="Dependability Φ of means over so many levels.",
-        alt="Curves that rise with the number of levels; the table has their numbers.",
+        caption="Dependability Φ of means, by number of levels.",
+        alt="Curves that rise with the number of levels; the table has the numbers.",
         content=curves,
         stamp="",
     )

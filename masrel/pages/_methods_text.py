@@ -162,29 +162,30 @@ _HOLM = _Text(
 )
 _LIMITS = _Text(
     "Limits of agreement are the mean difference ± 1.96 standard deviations of "
-    "differences; their intervals are exact for normal differences{}.",
+    "differences; their intervals are exact if differences are normal{}.",
     ("bland1999", "carkeet2015"),
 )
 _REPEATS = _Text(
-    "Limits of agreement are of single measurements: {} ± 1.96 standard deviations "
-    "made of the variances between and within items; their intervals combine those of "
-    "the parts (MOVER), that of the slope has HC3 errors{{}}.",
+    "Limits of agreement are for single measurements: {} ± 1.96 standard deviations, "
+    "computed from the variances between and within items. Their intervals combine "
+    "those of the parts (MOVER); the interval of the slope uses HC3 errors{{}}.",
     ("zou2013", "bland1999", "mackinnon1985"),
 )
 _WITHOUT = _Text(
-    "What each rater adds is how the coefficient changes without the rater; its "
-    "interval is by a jackknife over items{}.",
+    "The effect of each rater is the change of the coefficient without the rater, "
+    "with an interval by a jackknife over items{}.",
     ("efron1981",),
     is_of_ends=True,
 )
 _SPECIFIC = (
     _Text(
-        "Agreement on a grade is specific agreement: how often, where one rater gave "
-        "the grade, another rater gave it too{}.",
+        "Agreement on a grade is specific agreement: how often another rater also "
+        "gave a grade that one rater gave{}.",
         ("cicchetti1990",),
     ),
     _Text(
-        "Its intervals are Clopper and Pearson's at the effective number of items{}.",
+        "Its intervals are Clopper-Pearson intervals at the effective number of "
+        "items{}.",
         ("korn1998",),
         is_of_ends=True,
     ),
@@ -193,13 +194,14 @@ _SPECIFIC = (
 _TEXTS: dict[str, tuple[_Text, ...]] = {
     "symmetry": (
         _Text(
-            "Whether changes from one rater to the other balance was tested: {tests}{}."
+            "Whether changes from one rater to the other balance was tested by "
+            "{tests}{}."
         ),
     ),
     "indices": (
         _Text(
-            "Prevalence and bias are told by their indices, PABAK, the largest κ that "
-            "the margins allow, and agreement on each grade{}.",
+            "Prevalence and bias are described by their indices, PABAK, the largest κ "
+            "that the margins allow, and agreement on each grade{}.",
             ("byrt1993", "cicchetti1990"),
         ),
     ),
@@ -214,27 +216,27 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
     },
     "limits_with_mean": (
         _Text(
-            "Limits of agreement with the mean of all raters, SEM and MDC95 were made "
-            "of the variances between raters and of the rest; their intervals are "
-            "those of a sum of mean squares{}.",
+            "Limits of agreement with the mean of all raters, SEM and MDC95 were "
+            "computed from the variances between raters and of the rest; their "
+            "intervals are those of a sum of mean squares{}.",
             ("christensen2020", "graybill1980"),
         ),
     ),
     "bland_altman": (_LIMITS,),
     "differences": (
         _Text(
-            "Differences between groups have intervals and tests by a jackknife over "
-            "{units}, with Student's t{}.",
+            "Intervals and tests of differences between groups are by a jackknife "
+            "over {units}, with Student's t{}.",
             ("gwet2016", "efron1981"),
         ),
         _HOLM,
     ),
     "judges": (
         _Text(
-            "Whether {judges} may stand for a human was tested by the alternative "
-            "annotator test{}: how close the grades of judge and human are to those of "
-            "the other humans (score: {row[score]}), and whether the human is better "
-            "by ε = {row[epsilon]} or more.",
+            "Whether {judges} can replace a human was tested by the alternative "
+            "annotator test{}. It compares how close the grades of judge and human "
+            "are to those of the other humans (score: {row[score]}), and tests "
+            "whether the human is better by ε = {row[epsilon]} or more.",
             ("calderon2025",),
         ),
         _Text(
@@ -246,15 +248,15 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
     ),
     "humans": (
         _Text(
-            "P-values of humans are {tests}, by Tango's statistic{}, and adjusted for "
-            "all humans of a judge.",
+            "P-values for humans are {tests}, by Tango's statistic{}, and adjusted "
+            "over all humans for each judge.",
             ("tango1998", "benjamini2001"),
         ),
     ),
     "judge_reference": (
         _Text(
-            "How often judge and human have the grade of the reference was compared by "
-            "Tango's test and interval{}, with ε = {row[epsilon]}.",
+            "How often judge and human give the grade of the reference was compared "
+            "by Tango's test and interval{}, with ε = {row[epsilon]}.",
             ("tango1998",),
         ),
     ),
@@ -267,46 +269,46 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
     ),
     "preferences": (
         _Text(
-            "Whether a judge gains the answer shown first was told from pairs shown in "
+            "The effect of the order on a judge was estimated from pairs shown in "
             "both orders, by Tango's interval and McNemar's exact test{}.",
             ("tango1998", "mcnemar1947"),
         ),
     ),
     "strengths": (
         _Text(
-            "Strengths are those of the model of Bradley and Terry{}, with a variance "
-            "by items.",
+            "Strengths are from the model of Bradley and Terry{}, with the variance "
+            "between items.",
             ("bradley1952",),
         ),
     ),
     "truth": (
         _Text(
             "Classes of items and errors of raters were estimated by Dawid and "
-            "Skene's model{}, from the majority start, with posteriors drawn by Gibbs "
-            "sampling; it takes raters to err each by themselves.",
+            "Skene's model{}, starting from the majority, with posteriors drawn by "
+            "Gibbs sampling. The model assumes that raters err independently.",
             ("dawid1979",),
         ),
     ),
     "rates": (
         _Text(
-            "The rate of {row[grade]} is that of prediction-powered inference{}, from "
-            "{row[n_labels]} labels and {row[n_judged]} grades of a judge.",
+            "The rate of {row[grade]} was estimated by prediction-powered inference{} "
+            "from {row[n_labels]} labels and {row[n_judged]} grades of a judge.",
             ("angelopoulos2023",),
         ),
         _Text(
-            "Beside it stands the judge's rate corrected for its sensitivity and "
-            "specificity{}.",
+            "The judge's rate corrected for its sensitivity and specificity is also "
+            "given{}.",
             ("rogan1978", "lang2014"),
         ),
     ),
-    "equality": (_Text("{tests} tests whether all groups agree as well{}."),),
+    "equality": (_Text("{tests} tests whether all groups agree equally well{}."),),
     "diagnosis_raters": (_WITHOUT,),
     "pairs": (_WITHOUT,),
     "diagnosis_categories": _SPECIFIC,
     "categories": _SPECIFIC,
     "components": (
         _Text(
-            "Variances of items, raters and the rest are those of ICC(A,1){}.",
+            "Variances of items, raters and the rest are from ICC(A,1){}.",
             ("mcgraw1996",),
         ),
     ),
@@ -355,8 +357,7 @@ def _of_data(file: RatingsFile, items: str) -> str:
     if n_missing := read["n_missing"]:
         are = "is" if n_missing == 1 else "are"
         text += (
-            f" {counted(n_missing, 'rating')} {are} missing; estimates use all that "
-            "are there."
+            f" {counted(n_missing, 'rating')} {are} missing; estimates use all others."
         )
     return text
 

@@ -166,7 +166,7 @@ class PartSeen:
         n_all = int((self.disagreement > 0.0).sum())
         which = f"{n} of {n_all}" if n < n_all else str(n)
         noun = "item" if n_all == 1 else "items"
-        return f"{which} {noun} that raters disagree on, most first"
+        return f"{which} {noun} that raters disagree on, most disagreement first"
 
     @property
     def items(self) -> list[str]:
@@ -214,19 +214,19 @@ _FORESTS = {
     "humans": _Forest(
         "human",
         "difference",
-        "human's share less the judge's",
+        "human's share minus the judge's",
         "How much more often than the judge each human is at least as close to the "
-        "other humans, with {level} % confidence intervals (Tango): where ε = "
-        "{epsilon:g} is excluded the judge is not worse.",
+        "other humans, with {level} % confidence intervals (Tango). If the interval "
+        "excludes ε = {epsilon:g}, the judge is not worse.",
         1.0,
     ),
     "judge_reference": _Forest(
         "human",
         "difference",
-        "judge's share of right grades less the human's",
-        "How much more often than the human the judge has the grade of {reference}, "
-        "with {level} % confidence intervals (Tango): where ε = {epsilon:g} in favour "
-        "of the human is excluded the judge is not worse.",
+        "judge's share of correct grades minus the human's",
+        "How much more often than the human the judge gives the grade of {reference}, "
+        "with {level} % confidence intervals (Tango). If the interval excludes ε = "
+        "{epsilon:g} in favour of the human, the judge is not worse.",
         -1.0,
     ),
     "rates": _Forest(
@@ -239,7 +239,7 @@ _FORESTS = {
     "strengths": _Forest(
         "model",
         "value",
-        "strength: logarithm of the odds against an average answer",
+        "strength: log odds of winning against an average answer",
         "Which answer each judge prefers (Bradley-Terry), with {level} % confidence "
         "intervals.",
     ),
@@ -265,7 +265,7 @@ def judge_drawings(answers: Sequence[Answer], level: float) -> Iterator[Drawing]
                 expected
             )
         text = (
-            "How often each rater gave each grade to items of each class, as expected."
+            "Expected share of each grade that each rater gives to items of each class."
         )
         yield Drawing(
             name="confusions",
@@ -306,7 +306,7 @@ def _judge_drawing(
     ends, right, mark = [row.interval.high for row in rows if row.interval], 1.03, None
     if forest.margin:
         at = forest.margin * of["epsilon"]
-        mark = at, f"ε = {of['epsilon']:g}: worse by so much is too much"
+        mark = at, f"ε = {of['epsilon']:g}: limit of what is acceptable"
         right = max(*(ends or [1.0]), at) + 0.05
     elif name == "strengths":
         right = max(ends or [1.0]) * 1.05
@@ -403,9 +403,9 @@ def _confusion(seen: PartSeen) -> Drawing | None:
         "confusion",
         f"{_GRADES}:confusion_picture",
         (table, grades, names, seen.file.is_ordered),
-        f"{title}: how often each pair was given, shaded by its share of the row; "
-        "framed: the same grade.",
-        f"{title}: {same} of {n} pairs are the same.",
+        f"{title}: number of times that each pair was given, shaded by its share of "
+        "the row. Frames mark the same grade.",
+        f"{title}: {same} of {n} pairs are the same grade.",
     )
 
 
@@ -418,7 +418,7 @@ def _grades(seen: PartSeen) -> Drawing | None:
         "grades",
         f"{_GRADES}:grades_picture",
         (counts, seen.raters, grades, seen.file.is_ordered),
-        "Use of each grade: its share of the ratings of each rater.",
+        "Use of each grade: its share of each rater's ratings.",
     )
 
 
@@ -432,8 +432,9 @@ def _categories(seen: PartSeen) -> Drawing | None:
         "categories",
         f"{_GRADES}:categories_picture",
         (of.category_values, *ends, of.category_counts, grades, of.level),
-        "Agreement on each grade: of the ratings in it, the share that meets the same "
-        f"of another rater of the item{level if np.isfinite(ends[0]).any() else ''}.",
+        "Agreement on each grade: of the ratings with this grade, the share that "
+        "another rater of the item "
+        f"matched{level if np.isfinite(ends[0]).any() else ''}.",
     )
 
 
@@ -451,12 +452,14 @@ def _bland_altman(seen: PartSeen) -> Drawing | None:
         "bland_altman",
         "masrel.plots._limits_figure:limits_pictures",
         ([("", (raters, result))], seen.questions.unit or ""),
-        f"{' and '.join(raters)} against their mean: how far they lie apart, and the "
-        "limits between which 95 % of single measurements are expected."
+        f"{' and '.join(raters)} against their mean: the differences, and the limits "
+        "between which 95 % of single measurements are expected."
         if len(raters) > 2 or isinstance(result, RepeatedLimits)
-        else f"Difference of {raters[0]} and {raters[1]} over their mean, with the "
-        "mean difference and the limits between which 95 % of differences are "
-        "expected.",
+        else (
+            f"Difference between {raters[0]} and {raters[1]} against their mean, with "
+            "the mean difference and the limits between which 95 % of differences are "
+            "expected."
+        ),
     )
 
 
@@ -468,7 +471,8 @@ def _components(seen: PartSeen) -> Drawing | None:
         "components",
         "masrel.plots._rater_pairs:components_picture",
         (variance_components(seen.coded),),
-        "Variance of a rating: between items, between raters, and the rest, as shares.",
+        "Shares of the variance of a rating: between items, between raters, and the "
+        "rest.",
     )
 
 
@@ -534,7 +538,9 @@ def picture_of(
         with warnings.catch_warnings(action="ignore", category=MasrelWarning):
             drawing = PICTURES[name][1](parts[group or next(iter(parts))])
     if drawing is None:
-        raise ParameterError(f"picture: these ratings have no {name}; {_NEEDS[name]}")
+        raise ParameterError(
+            f"picture: {name!r} is not available for these ratings; {_NEEDS[name]}"
+        )
     return drawing.content
 
 
@@ -543,9 +549,10 @@ _NEEDS = {
     "forest": "it shows coefficients of agreement",
     "pairs": "it needs three raters or more",
     "confusion": "it needs two raters, or Reading(reference=…), and 2 to 20 grades",
-    "bland_altman": "it needs two raters who measured",
-    "grades": "it needs to know who rated what, and 2 to 20 grades",
-    "categories": "it needs to know who rated what, and 2 to 20 grades",
+    "bland_altman": "it needs measurements of two raters",
+    "grades": "it needs ratings that show who rated what, and 2 to 20 grades",
+    "categories": "it needs ratings that show who rated what, and 2 to 20 grades",
     "items": "it needs items that raters disagree on",
-    "components": "it needs coefficients with an ICC, and to know who rated what",
+    "components": "it needs an ICC among the coefficients, and ratings that show who "
+    "rated what",
 }

@@ -47,13 +47,13 @@ def size_by_formula(design: Design) -> int:
         ),
         (
             chance_of(study) is not None and not is_of_one,
-            f"{'assurance' if study.power is None else 'power'}: method {study.method} "
-            'has no formula of it for this aim; it needs "auto", "exact" or '
+            f"{'assurance' if study.power is None else 'power'}: method "
+            f'{study.method} has no formula for this aim; use "auto", "exact" or '
             '"simulation"',
         ),
         (
             is_icc and study.coefficient != ONE_WAY,
-            f"method: the formulas are of icc_1, got {study.coefficient}",
+            f"method: the formulas are for icc_1, got {study.coefficient}",
         ),
     )
     items = _wald_items if study.method == "wald" else _fit_items
@@ -229,8 +229,8 @@ def check_has_numbers(design: Design) -> None:
     refuse(
         (
             design.is_icc and study.method in FORMULAS,
-            f"method: {study.method} of {design.entry.title} gives a size only: it "
-            'needs sample_size, or method "exact"',
+            f"method: {study.method} of {design.entry.title} gives only a size: use "
+            'sample_size, or method "exact"',
         ),
         (
             is_fit and (study.n_raters, q) != (2, 2),

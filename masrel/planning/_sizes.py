@@ -79,7 +79,7 @@ def precision(study: Study, *, progress: Progress | None = None) -> Plan:
     refuse(
         (
             None in (study.n_items, study.n_raters),
-            "n_items, n_raters: a study that is shown needs both",
+            "n_items, n_raters: needs both to show a study",
         )
     )
     check_aim(study, is_solved=False)
@@ -134,12 +134,12 @@ def sample_size(study: Study, *, progress: Progress | None = None) -> Plan:
     (154, 'exact')
     """
     n_known = (study.n_items is not None) + (study.n_raters is not None)
-    got = "both" if n_known else "none, and no prices by which to find the cheapest"
+    got = "both" if n_known else "neither, and no prices to find the cheapest"
     refuse(
         (
             n_known == 2 or (n_known == 0 and study.prices is None),
-            "n_items, n_raters: needs exactly one of them, since the other is solved "
-            f"for; got {got}",
+            "n_items, n_raters: needs exactly one of them, because the other is "
+            f"solved for, got {got}",
         )
     )
     check_aim(study, is_solved=True)
@@ -222,7 +222,8 @@ def plan_grid(
         (all(is_solved), "n_items, n_raters: a grid needs one of them, got none"),
         (
             study.method != "auto",
-            f"method: a grid is by auto, exact where it can be; got {study.method}",
+            "method: a grid needs auto, which is exact if possible, got "
+            f"{study.method}",
         ),
         (
             executor not in (None, "dask"),
@@ -230,7 +231,7 @@ def plan_grid(
         ),
         (
             scheduler is not None and executor is None,
-            'scheduler: is of executor "dask" alone, got none',
+            'scheduler: needs executor "dask", got none',
         ),
     )
     check_aim(study, is_solved=any(is_solved))
@@ -268,8 +269,8 @@ def _by_dask(cells: Sequence[Design], scheduler: str | None) -> Iterator[Plan]:
         client = Client(scheduler, set_as_default=False, timeout="10s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise ParameterError(
-            f"scheduler: needs an address as tcp://127.0.0.1:8786, got {scheduler!r}: "
-            f"{error}"
+            "scheduler: needs an address such as tcp://127.0.0.1:8786, got "
+            f"{scheduler!r}: {error}"
         ) from error
     with client:  # a cell whose worker dies is planned again by another
         for future in client.map(_planned, cells, pure=False):
@@ -398,8 +399,8 @@ class _Search:
         n = min(highest, 200) if is_slow else highest
         best, (name, words) = self.at(n), aim_words(study)
         note = (
-            f"{name}: {words} needs more than {highest} {self._name}; the best that "
-            f"can be had with {n} is {reached_words(study, best)}"
+            f"{name}: {words} needs more than {highest} {self._name}; the best with "
+            f"{n} is {reached_words(study, best)}"
         )
         return replace(best, notes=(note,), reaches_aim=False)
 
@@ -429,13 +430,16 @@ class _Search:
             return plan
         around = range(max(self.lowest, int(0.85 * n)), int(1.25 * n) + 2)
         if sum(self.sized(size).n_tables for size in around) > _MAX_SCAN:
-            note = "larger sizes were not looked at: a chance can fall with one more"
+            note = (
+                "larger sizes were not tried; the probability can fall when one is "
+                "added"
+            )
             return replace(plan, notes=(note,))
         first = next(size for size in around if self._is_met(size))
         stable = 1 + max((n for n in around if not self._is_met(n)), default=n - 1)
         note = (
-            f"{first} {self._name} reach it first, but {stable - 1} do not: the "
-            "chance goes up and down"
+            f"{first} {self._name} reach the aim first, but {stable - 1} do not, "
+            "because the probability goes up and down"
         )
         return replace(self.at(stable), notes=() if first == stable else (note,))
 
@@ -451,8 +455,9 @@ class _Search:
         refuse(
             (
                 n in (0, self.highest),
-                f"max_cost: needs a limit between {self.cost(self.lowest):g}, of the "
-                f"smallest study, and what some study costs; got {limit:g}",
+                f"max_cost: needs a limit between {self.cost(self.lowest):g}, the "
+                "cost of the smallest study, and the cost of some study, got "
+                f"{limit:g}",
             )
         )
         return n
@@ -475,7 +480,8 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     refuse(
         (
             limit < least,
-            f"max_cost: needs at least {least:g}, of the smallest study; got {limit:g}",
+            f"max_cost: needs at least {least:g}, the cost of the smallest study, got "
+            f"{limit:g}",
         )
     )
     best = smallest.at(smallest.lowest)
@@ -500,8 +506,8 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
         (
             best.reaches_aim is False,
             f"max_cost: {aim_words(study)[1]} is not reached for {limit:g}; the best "
-            f"that can be had is {best.n_items} items and {best.n_raters} raters, "
-            f"which cost {best.cost:g} and reach {reached_words(study, best)}",
+            f"study has {best.n_items} items and {best.n_raters} raters, which cost "
+            f"{best.cost:g} and reach {reached_words(study, best)}",
         )
     )
     return best
@@ -525,8 +531,8 @@ def _check_prices(study: Study) -> None:
         ),
         (
             min(per_item, per_rater) + per_rating == 0.0,
-            f"prices: needs a price of {free} or of a rating, since no number is best "
-            f"of what costs nothing; got {study.prices}",
+            f"prices: needs a price for {free} or for a rating, because there is no "
+            f"best number of what costs nothing, got {study.prices}",
         ),
     )
 

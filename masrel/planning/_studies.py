@@ -58,7 +58,7 @@ def shown(design: Design, progress: Progress | None = None) -> Shown:
     refuse(
         (
             design.n_tables > 20 * MAX_TABLES,
-            'method: "exact" sums over all studies that differ, of which there are '
+            'method: "exact" sums over all different studies, and there are '
             f'{design.n_tables:g}; "simulation" draws some of them',
         )
     )

@@ -193,12 +193,12 @@ class Study:
             ),
             (
                 is_of_items or (self.interval, self.target) == ("t", "both"),
-                f'interval: "{self.interval}" is not of target "{self.target}", where '
-                '"auto" and "jackknife" are',
+                f'interval: "{self.interval}" is not available for target '
+                f'"{self.target}"; use "auto" or "jackknife"',
             ),
             (
                 self.prior is not None and self.method != "goodness-of-fit",
-                f'prior: is of method "goodness-of-fit" alone, got "{self.method}"',
+                f'prior: is only for method "goodness-of-fit", got "{self.method}"',
             ),
         )
         if not isinstance(self.rng, Integral):
@@ -252,7 +252,7 @@ _RULES: dict[str, _Rule] = {
         lambda x: isinstance(x, np.random.Generator) or x >= 0,
     ),
     "target": (
-        "items, raters or both: what a new study draws anew",
+        "items, raters or both: the population to generalise to",
         object,
         lambda x: x in get_args(Target),
     ),
@@ -450,12 +450,12 @@ def check_aim(study: Study, *, is_solved: bool) -> None:
     refuse(
         (
             n_aims > 1,
-            "half_width: needs to be alone, as null does, and lower and upper do: one "
-            "aim a plan",
+            "half_width: needs a single aim per plan: half_width, or null, or lower "
+            "and upper",
         ),
         (
             power is not None and study.assurance is not None,
-            "assurance: needs no power beside it",
+            "assurance: cannot be combined with power",
         ),
         (
             power is not None and null is None and not limits,

@@ -83,8 +83,8 @@ def declared_model(study: Study) -> ItemModel:
     refuse(
         (
             name not in MODELS,
-            f"model: needs one of {', '.join(MODELS)}, or a LatentModel, since models "
-            f"of one kappa differ in precision; got {shown(study.model)}",
+            f"model: needs one of {', '.join(MODELS)}, or a LatentModel, because "
+            f"models with the same kappa differ in precision, got {shown(study.model)}",
         )
     )
     shares = _shares(study, is_table=name == "table")
@@ -106,7 +106,7 @@ def _shares(study: Study, *, is_table: bool) -> Floats:
     refuse(
         (
             categories is None and prevalences is None,
-            "categories, prevalences: need one of both, got neither",
+            "categories, prevalences: need one of them, got neither",
         ),
         (
             categories is not None and q < 2,
@@ -146,7 +146,8 @@ def _scale(study: Study, q: int) -> tuple[Label, ...]:
     refuse(
         (
             (len(study.categories), n_different) != (q, q),
-            f"categories: needs {q} that differ, as the model has, got {n_different}",
+            f"categories: needs {q} different ones, as the model has, got "
+            f"{n_different}",
         )
     )
     return tuple(study.categories)
@@ -470,8 +471,8 @@ def design_of(study: Study) -> Design:
         refuse(
             (
                 entry.formula is None or entry.has_interval,
-                f"coefficient: {entry.title} cannot be planned for: it is no function "
-                f"of sums over items; the others and {', '.join(FORMS)} can",
+                f"coefficient: {entry.title} cannot be planned for, because it is not "
+                f"a function of sums over items; the others and {', '.join(FORMS)} can",
             )
         )
         design = _with_value(Design.of(study, declared_model(study)))
@@ -479,11 +480,11 @@ def design_of(study: Study) -> Design:
     refuse(
         (
             study.coefficient != AGREEMENT and study.rater_share != RATER_SHARE,
-            f"rater_share: is of icc_a1 alone, got {study.coefficient}",
+            f"rater_share: is only for icc_a1, got {study.coefficient}",
         ),
         (
             null is not None and math.isclose(null, value, abs_tol=1e-9),
-            f"null: needs another number than value, {value:g}",
+            f"null: needs a number other than value, {value:g}",
         ),
         (
             lower is not None and lower >= value,
@@ -501,7 +502,7 @@ def design_of(study: Study) -> Design:
 def _check_normal(study: Study, entry: Coefficient) -> None:
     # what normal ratings have none of
     is_weighted = not isinstance(study.weights, str) or study.weights != "identity"
-    absent = f"{entry.title} takes none, since its ratings are normal"
+    absent = f"{entry.title} takes none, because its ratings are normal"
     value, target = study.value, entry.interval_target
     refuse(
         (is_weighted, f"weights: {absent} and complete"),
@@ -515,7 +516,7 @@ def _check_normal(study: Study, entry: Coefficient) -> None:
         ),
         (
             study.target != target,
-            f'target: the interval of {entry.title} is of other "{target}", got '
+            f'target: the interval of {entry.title} is for other "{target}", got '
             f'"{study.target}"',
         ),
     )
@@ -534,7 +535,7 @@ def _check_size(design: Design) -> None:
         ),
         (
             design.model.name == "table" and n not in (None, 2),
-            f"n_raters: a table is of two raters, got {n}",
+            f"n_raters: a table needs two raters, got {n}",
         ),
         (
             n_positions and study.n_items not in (None, n_positions),
@@ -552,7 +553,7 @@ def _with_value(design: Design) -> Design:
         refuse(
             (
                 value is not None and abs(implied - value) > 5e-3,
-                f"value: the model has {implied:.4f}, so it needs none, got {value}",
+                f"value: the model implies {implied:.4f}, got {value}",
             )
         )
         return Design.of(replace(study, value=implied), design.model)
@@ -584,7 +585,7 @@ def at_value(design: Design, value: float) -> Design:
     refuse(
         (
             not model.prevalences,
-            "model: a LatentModel has one value, and no null value",
+            "model: a LatentModel has one value and no null value",
         )
     )
     low, high = map(short_of, ends)

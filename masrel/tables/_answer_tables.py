@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from masrel.plots._drawn_values import Drawn
 
 Detail = Literal["brief", "usual", "all"]
-"""How much notes say: what must be known, how numbers were made, what they promise."""
+"""How much notes explain: what must be known, how numbers were computed, what
+they mean."""
 
 _CAPTIONS = {
     "agreement": "Agreement of the raters in {of}",
@@ -46,22 +47,23 @@ _CAPTIONS = {
     "limits_that_follow": "Limits of agreement on a line{in_unit}",
     "limits_of_ratios": "Limits of agreement, as ratios",
     "limits_with_mean": "Limits of agreement with the mean{in_unit}",
-    "diagnosis_raters": "What each rater adds to {of}",
+    "diagnosis_raters": "{of} with and without each rater",
     "diagnosis_pairs": "{of} of every two raters",
     "diagnosis_categories": "Agreement on each category",
-    "diagnosis_confusion": "What each rater said where {of} said the first",
-    "judges": "May the judge stand for a human?",
-    "humans": "The judge beside each human, both held against the other humans",
-    "judge_reference": "The judge beside the human, both held against the reference",
-    "judge_differences": "Differences of advantage between judges",
+    "diagnosis_confusion": "Grades of each rater, by the grade that {of} gave to the "
+    "same item",
+    "judges": "Can the judge replace a human?",
+    "humans": "The judge and each human, both compared with the other humans",
+    "judge_reference": "The judge and the human, both compared with the reference",
+    "judge_differences": "Differences in advantage between judges",
     "rates": "How often {of} is right",
-    "truth": "Classes of the items, by the ratings alone",
-    "truth_confusion": "What each rater says of items of each class",
-    "effective_number": "How many raters they are worth",
+    "truth": "Classes of the items, estimated from the ratings alone",
+    "truth_confusion": "Grades of each rater, by class of the item",
+    "effective_number": "How many independent raters they are worth",
     "preferences": "Does it matter which answer is shown first?",
     "strengths": "Which answer is preferred",
     "gates": "Gates",
-    "differences": "Differences of agreement between groups",
+    "differences": "Differences in agreement between groups",
     "equality": "Equality of agreement in all groups",
     "spans": "Agreement on spans",
 }
@@ -134,7 +136,7 @@ _COLUMNS: dict[str, tuple[Column, ...]] = {
     ),
     "diagnosis_confusion": (
         Column(key="rater", heading="Rater", align="left"),
-        Column(key="of", heading="{of} said", align="left"),
+        Column(key="of", heading="{of} gave", align="left"),
         Column(key="n", heading="Times"),
     ),
     "judges": (
@@ -275,10 +277,10 @@ _OF_ESTIMATES = (
 
 _CONVENTIONS = {
     "irrcac": "SE and interval: as irrCAC prints them.",
-    "spss": "SE and interval: as SPSS prints them; the SE of Fleiss' κ holds only if κ "
-    "is 0, and its interval may cover far less than it says.",
+    "spss": "SE and interval: as SPSS prints them. The SE of Fleiss' κ is valid only "
+    "if κ is 0, so the true coverage of its interval may be far lower than stated.",
     "over_n": "SE and interval: delta method over n, as the R packages vcd and psych "
-    "print them of Cohen's κ.",
+    "print them for Cohen's κ.",
 }
 
 _SOURCES = {
@@ -352,7 +354,7 @@ def _row_notes(rows: Sequence[Row], by: str, detail: Detail) -> tuple[str, ...]:
     texts_of: dict[str, list[str]] = {}
     for (text, is_of_interval), subset in rows_of.items():
         is_of_all = len(subset) == (n_intervals if is_of_interval else len(rows))
-        start = text if is_of_all else _names(subset, rows, by)
+        start = capital(text) if is_of_all else _names(subset, rows, by)
         texts_of.setdefault(start, []).extend([] if is_of_all else [text])
     return tuple(
         f"{start}: {'; '.join(texts)}." if texts else f"{start}."
@@ -499,7 +501,7 @@ def _errors_note(rows: Sequence[AgreementRow], in_sentences: bool) -> list[str]:
     conventions = {row.convention for row in rows}
     notes = [text for name, text in _CONVENTIONS.items() if name in conventions]
     return notes + [
-        Explanation(f"SE: delta method, {sample} as the sample.")
+        Explanation(f"SE: delta method, with {sample} as the sample.")
         for is_clustered, sample in samples.items()
         if is_clustered in are_clustered
     ]
@@ -520,7 +522,7 @@ def _paired_note(rows: Sequence[AgreementRow], items: str) -> list[str]:
         f"{of.n_items_paired} of {of.n_items}{'' if is_one else f' ({group})'}"
         for group, of in fewer.items()
     ]
-    return [f"{capital(items)} that have {pair}: {', '.join(counts)}."]
+    return [f"{capital(items)} with {pair}: {', '.join(counts)}."]
 
 
 def _interval_note(interval: Interval, detail: Detail, noun: Noun) -> str:
@@ -534,19 +536,23 @@ def _interval_note(interval: Interval, detail: Detail, noun: Noun) -> str:
 
 
 def words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
-    """Say what the words for values are, and by what law."""
+    """Explain the words for values, and by which distribution they were chosen."""
     named = [row for row in rows if word_of(row, bands) is not None]
     bounded = [row for row in named if row.lower_bound is not None]
     laws = ["its interval (one-sided)"] if bounded else []
     if len(bounded) < len(named):
         none = " where there is none" if bounded else ""
-        laws.append(f"a normal law around the estimate{none}")
+        laws.append(f"a normal distribution around the estimate{none}")
     by = f", by {', or by '.join(laws)}" if laws else ""
-    by += "; undefined where the SE is 0, which does not mean that it is certain" * any(
-        row.lower_bound is None and row.estimate.standard_error == 0.0 for row in named
+    by += (
+        "; undefined if the SE is 0, which does not mean that the value is certain"
+        * any(
+            row.lower_bound is None and row.estimate.standard_error == 0.0
+            for row in named
+        )
     )
     return (
-        f"At least: the best word of {_SOURCES[bands]} that the true value reaches "
+        f"At least: the highest band of {_SOURCES[bands]} that the true value reaches "
         f"with 95 % probability{by}; the words are conventions."
     )
 
@@ -563,7 +569,7 @@ def agreement_sentences(
             None,
             "undefined",
         ):
-            earned = f"at least {word} after {_SOURCES[bands]}"
+            earned = f"at least {word} by {_SOURCES[bands]}"
         group = "".join(f"{capital(by)} {row.group}: " for by in answer.heads.values())
         lines.append(
             f"{stamp}{group}{sentence(row.estimate, items=items, word=earned)}"
@@ -596,7 +602,7 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
     refuse(
         (
             not rows,
-            "--figure: shows coefficients of agreement, got only estimates in the "
+            "--figure: needs coefficients of agreement, got only estimates in the "
             "units of the ratings",
         )
     )

@@ -30,8 +30,8 @@ _READING_COLUMNS = (
 )
 
 _COUNTED = (
-    "A table and its transpose are two; no more than 10 000 are counted. Where none "
-    "fits, the numbers cannot all be of one table as they were read; why is not said."
+    "A table and its transpose count as two; counting stops at 10 000. If no table "
+    "fits, the numbers as read cannot all come from one table; the reason is unknown."
 )
 
 
@@ -46,7 +46,7 @@ def claims_table(audits: Sequence[ClaimAudit]) -> Table:
     notes += [note for audit in audits for note in _examples_note(audit)]
     return table_of(
         "claims",
-        "Printed agreement held against every table that could give it",
+        "Printed agreement compared with every table that could give it",
         _CLAIM_COLUMNS,
         [
             asdict(audit.claim)
@@ -77,7 +77,7 @@ def readings_table(audits: Sequence[ClaimAudit]) -> Table:
     ]
     return table_of(
         "readings",
-        "Every reading that was tried",
+        "All readings that were tried",
         _READING_COLUMNS,
         rows,
         hide_empty=True,

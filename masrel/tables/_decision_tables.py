@@ -58,9 +58,9 @@ def _interval_columns(of: str) -> list[Column]:
 
 _CAPTIONS = {
     "components": "",
-    "d_study": "Reliability of means over so many levels",
+    "d_study": "Reliability of means, by number of levels",
     "single_ratings": "Reliability of single ratings: Φ is ICC, absolute agreement",
-    "planned": "Intervals that studies to come can expect",
+    "planned": "Intervals to expect in future studies",
 }
 
 
@@ -178,7 +178,7 @@ def study_methods(study: GStudy) -> str:
         f"Components of variance were estimated by {study.method} from "
         f"{counted(study.n_ratings, 'rating')} (levels: {_levels(study)}), with "
         f"{percent(study.level)} % intervals ({method}); reliability and its "
-        "intervals are made of the same components (Brennan, 2001)."
+        "intervals were computed from the same components (Brennan, 2001)."
     )
 
 

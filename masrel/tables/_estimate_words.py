@@ -21,10 +21,19 @@ if TYPE_CHECKING:
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
 
-_POPULATIONS = {
-    "raters": "the same {} were put to other raters like these",
-    "items": "these raters graded other {} like these",
-    "both": "other raters graded other {}, both like these",
+_POPULATIONS = {  # of studies that are repeated, and of one value
+    "raters": (
+        "with other raters like these and the same {}",
+        "all raters like these on these {}",
+    ),
+    "items": (
+        "with the same raters and other {} like these",
+        "these raters on all {} like these",
+    ),
+    "both": (
+        "with other raters and other {} like these",
+        "all raters and {} like these",
+    ),
 }
 
 
@@ -53,31 +62,35 @@ def forest_row(
 
 
 def promise(interval: Interval, noun: Noun) -> str:
-    """Return what an interval promises, and of whom."""
+    """Return what an interval means, and for which population."""
     level = f"{percent(interval.level)} %"
     # clusters are drawn anew with the items in them
     plural = f"clusters of {noun}s" if interval.unit == "clusters" else f"{noun}s"
-    population = _POPULATIONS[interval.target].format(plural)
+    studies, whole = (of.format(plural) for of in _POPULATIONS[interval.target])
     if interval.kind == "confidence":
         return (
-            f"if {population}, again and again, about {level} of the intervals made "
-            "this way would hold the value that all such studies together would give"
+            f"if the study were repeated many times {studies}, about {level} of "
+            "intervals computed this way would contain the value that all these "
+            "studies together would give"
         )
     # A probability rests on the prior, and of other raters on how they differ.
     premises = "these ratings, the prior and the model of how raters differ"
     if interval.target == "items":
         premises = "these ratings and the prior"
     elif not interval.raters_differ:
-        premises = "these ratings, the prior and raters who differ by chance alone"
-    where = "above the lower end" if interval.is_one_sided else "inside"
+        premises = (
+            "these ratings, the prior and the assumption that raters differ by chance "
+            "alone"
+        )
+    where = "above the lower end" if interval.is_one_sided else "in this interval"
     return (
-        f"given {premises}, the value that would be found if {population}, "
-        f"without end, lies {where} with probability {level}"
+        f"given {premises}, there is a {level} probability that the value for "
+        f"{whole} lies {where}"
     )
 
 
 def origin(interval: Interval, noun: Noun) -> str:
-    """Return in brackets what the ends of an interval came from."""
+    """Return, in brackets, what was drawn or left out to compute an interval."""
     if interval.unit is None or interval.units_are is None:
         return ""
     one, many = {

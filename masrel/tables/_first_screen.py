@@ -24,10 +24,9 @@ _SHOWN = 12  # raters that are named
 
 # Scales to what is said of them where nobody declared them
 _SCALES = {
-    "MAS": "Scale: the Modified Ashworth Scale, {}, told by its grade 1+; --categories "
-    "declares another.",
-    "observed": "Scale: the grades met (AC and Brennan-Prediger depend on it; "
-    "--categories declares another).",
+    "MAS": "Scale: Modified Ashworth, {} (recognised by 1+); --categories changes it.",
+    "observed": "Scale: the grades in the data; --categories changes it. AC and "
+    "Brennan-Prediger depend on the scale.",
 }
 
 
@@ -115,11 +114,11 @@ def _of_grades(file: RatingsFile) -> list[str]:
         f"{by}.": by,
         f"Grades{name}: {listed}.": True,
         f"Missing: {codes or read['n_missing']}.": read["n_missing"],
-        f"Repeated: {repeated}, {read['repeated']} taken.": repeated,
+        f"Repeated ratings: {repeated}; used: {read['repeated']}.": repeated,
         f"Rows left out: {rows}.": rows,
-        f"Unit, left off: {read.get('unit')}.": "unit" in read,
-        f"Thousands mark, left off: {read.get('thousands')!r}.": "thousands" in read,
-        f"The same grade: {'; '.join(same[:_SHOWN])}.": same,
+        f"Unit removed: {read.get('unit')}.": "unit" in read,
+        f"Thousands separator removed: {read.get('thousands')!r}.": "thousands" in read,
+        f"Read as the same grade: {'; '.join(same[:_SHOWN])}.": same,
     }
     return [text for text, is_so in texts.items() if is_so]
 
@@ -168,7 +167,7 @@ def reading_warnings(ratings: RatingsFile, first: Answer) -> tuple[Finding, ...]
 _RESULTS = {
     "differences": (
         "low",
-        "{title} of {first} less that of {second} is {difference} ({level} % "
+        "{title} of {first} minus that of {second} is {difference} ({level} % "
         "confidence interval {low} to {high}; p-value {p_value}).",
     ),
     "equality": (
@@ -183,19 +182,19 @@ _RESULTS = {
     ),
     "limits_of_agreement": (
         "lower",
-        "{first} less {second}{group} is {mean}{unit} on average; 95 % of such "
+        "{first} minus {second}{group} is {mean}{unit} on average; 95 % of such "
         "differences are expected between {lower} and {upper}{unit}.",
     ),
     "limits_with_repeats": (
         "value",
-        "{first} less {second}{group} is {value}{unit} on average; 95 % of such "
+        "{first} minus {second}{group} is {value}{unit} on average; 95 % of such "
         "differences are expected between {low_limit} and {high_limit}{unit}.",
     ),
     "limits_that_follow": (
         "value",
-        "{first} less {second}{group} changes by {slope} for each unit of their mean; "
-        "where that is {average}{unit}, 95 % of such differences are expected between "
-        "{low_limit} and {high_limit}{unit}.",
+        "{first} minus {second}{group} changes by {slope} for each unit of their "
+        "mean; if the mean is {average}{unit}, 95 % of such differences are expected "
+        "between {low_limit} and {high_limit}{unit}.",
     ),
     "limits_of_ratios": (
         "value",
@@ -236,20 +235,20 @@ def result_sentence(answered: Sequence[Answer], items: str) -> tuple[int, str]:
 
 # Answers about judges to what is said of each row
 _VERDICTS = {
-    "judges": "{judge}{group} {may}: that it is worse by less than ε = {epsilon}, if "
-    "at all, is shown for {n_rejected} of {n_humans} humans, and {n_needed}.{no_proof} "
-    "On {advantage} % of {items} its grade is as close to those of the "
-    "other humans as a human's is, or closer{ends}.",
-    "judge_reference": "{judge}{group} {may}: it has the grade of {reference} on "
+    "judges": "{judge}{group} {may}: it is worse by less than ε = {epsilon}, if at "
+    "all, for {n_rejected} of {n_humans} humans, and {n_needed}.{no_proof} On "
+    "{advantage} % of {items} its grade is at least as close to those of the other "
+    "humans as a human's is{ends}.",
+    "judge_reference": "{judge}{group} {may}: it gives the grade of {reference} on "
     "{difference} % of {items} {more} than {human}{ends}, and {margin} % fewer would "
-    "do.{no_proof}",
-    "truth": "{class}{group} is the class of {share} % of {items} by the ratings alone"
-    "{ends}, if raters err each by themselves.",
+    "be acceptable.{no_proof}",
+    "truth": "By the ratings alone, {class}{group} is the class of {share} % of "
+    "{items}{ends}, if raters err independently.",
     "preferences": "{judge} gives the same verdict in both orders on {agreement} % of "
-    "{n_pairs} pairs; share won by being shown first, less that by being shown second: "
-    "{value} %{ends}.",
+    "{n_pairs} pairs; the share won by the answer shown first minus the share won by "
+    "the one shown second is {value} %{ends}.",
     "rates": "{grade} is right for {value} % of {items}{group} by {title}{ends}; "
-    "{judge} alone says {naive} %.",
+    "{judge} alone gives {naive} %.",
 }
 _IN_PERCENT = (
     *("advantage", "agreement", "difference", "value", "naive", "share"),
@@ -280,9 +279,9 @@ def _verdicts(answered: Sequence[Answer], items: str) -> Iterator[str]:
             words: Row = {
                 **of,
                 "group": f" ({row['group']})" if row.get("group") else "",
-                "may": "may stand for a human"
+                "may": "can replace a human"
                 if passes
-                else "is not shown to be able to stand for a human",
+                else "has not been shown to be able to replace a human",
                 "n_needed": f"{n} {'is' if n == 1 else 'are'} "
                 f"{'enough' if passes else 'needed'}",
                 "no_proof": "" if passes else " That is no proof that it is worse.",

@@ -71,14 +71,13 @@ def _notes(result: "LatentTrait") -> Iterator[str]:
     yield (
         "Unit: the standard deviation of a rating; 0 is the mean severity of these "
         "items, and for biases the mean of all raters. A rater with a positive bias "
-        "grades high; noise is how far the same item is perceived from one time to the "
-        "next."
+        "grades high; noise is how much a rater's perception of the same item varies."
     )
     if len(thresholds := [quantity.value for quantity in result.thresholds]) > 1:
         distance = (thresholds[-1] - thresholds[0]) / (len(thresholds) - 1)
         yield (
-            f"Neighbouring thresholds are {number(distance, 2)} apart on average: a "
-            "bias of that is about one grade."
+            f"Neighbouring thresholds are {number(distance, 2)} apart on average; a "
+            "bias of that size is about one grade."
         )
     yield f"Prior: {result.prior.words}."
     if result.other is not None:

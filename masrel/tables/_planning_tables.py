@@ -44,7 +44,7 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
         f"{percent(first.level)} % interval for other {_POPULATIONS[first.target]}, "
         f"model: {first.model}"
         if not labels
-        else "What the study can show, by line of its plan"
+        else "Precision of the study, by line of its plan"
     )
     lines: Sequence[str | None] = labels or [None] * len(plans)
     rows = [_row(p) | {"line": line} for p, line in zip(plans, lines, strict=True)]
@@ -86,14 +86,15 @@ def _values(plan: Plan) -> dict[str, Any]:
 
 def _notes(plans: Sequence[Plan]) -> tuple[str, ...]:
     notes = [
-        "half-width, low and high are expected ones: about half of all studies have a "
-        "wider interval"
+        "half-width, low and high are expected values: about half of all studies have "
+        "a wider interval"
     ]
     if n := sum(plan.n_studies for plan in plans):
         seeds = sorted({plan.seed for plan in plans if plan.seed is not None})
         notes.append(
             f"{n} simulated studies, seed {', '.join(map(str, seeds))}; the Monte "
-            "Carlo error is that of the number aimed at, else of the half-width"
+            "Carlo error is for the number of the aim, or for the half-width if there "
+            "is no aim"
         )
     reaching = [plan for plan in plans if plan.reaches_aim]
     if len(plans) > 1 and reaching:
@@ -111,7 +112,7 @@ def planning_sentence(plan: Plan) -> str:
     title = coefficient(plan.coefficient).title
     weights = "" if plan.weights == "identity" else f" with {plan.weights} weights"
     how = {
-        "exact": "; summed over all studies that there can be",
+        "exact": "; summed over all possible studies",
         "simulation": f"; {plan.n_studies} simulated studies",
         "": "",
     }.get(plan.method, f"; {plan.method} formula")

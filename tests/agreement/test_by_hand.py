@@ -114,7 +114,10 @@ def test_one_pair_without_a_kappa_is_named_and_none_is_given() -> None:
     with pytest.warns(UndefinedStatisticWarning, match="columns 1 and 2"):
         found = light_kappa([["a", "b", "b"], ["b", "b", "b"], ["a", "b", "b"]])
     assert math.isnan(found.value)
-    assert found.reason == "0/0: one category is all of the raters in columns 1 and 2"
+    assert (
+        found.reason
+        == "0/0: there is only one category of the raters in columns 1 and 2"
+    )
     # with what chance gives all the same
     assert not math.isnan(found.observed)
 

@@ -113,14 +113,22 @@ def test_two_sequences_are_the_raters_of_a_table(form: Callable[..., Any]) -> No
     ("first", "second", "why"),
     [
         (KIM, LEE[:3], "got 5 and 3 labels"),
-        ([KIM, LEE], LEE, "a sequence each"),
-        (pd.DataFrame({"Kim": KIM}), LEE, "a sequence each, .* got DataFrame and list"),
-        (pl.DataFrame({"Kim": KIM}), LEE, "a sequence each"),
-        (pa.table({"Kim": KIM}), LEE, "a sequence each"),
-        (KIM, np.array([LEE]), "a sequence each"),
-        (KIM, dict.fromkeys("abcde"), "a sequence each"),
-        ("xyyxx", "xyxxx", "a sequence each"),
-        (pd.Series(KIM), pd.Series(LEE, index=range(1, 6)), "two Series of one index"),
+        ([KIM, LEE], LEE, "one sequence for each"),
+        (
+            pd.DataFrame({"Kim": KIM}),
+            LEE,
+            "one sequence for each, .* got DataFrame and list",
+        ),
+        (pl.DataFrame({"Kim": KIM}), LEE, "one sequence for each"),
+        (pa.table({"Kim": KIM}), LEE, "one sequence for each"),
+        (KIM, np.array([LEE]), "one sequence for each"),
+        (KIM, dict.fromkeys("abcde"), "one sequence for each"),
+        ("xyyxx", "xyxxx", "one sequence for each"),
+        (
+            pd.Series(KIM),
+            pd.Series(LEE, index=range(1, 6)),
+            "two Series with the same index",
+        ),
         ([], [], "at least one of each"),
     ],
 )
@@ -161,7 +169,7 @@ def test_the_word_of_the_krippendorff_package() -> None:
 
 def test_raters_by_items_as_that_package_takes_them_are_refused() -> None:
     turned = [list(column) for column in zip(*MEASURES, strict=True)]
-    with pytest.raises(ParameterError, match=r"4 rows and 5 columns .* turn the table"):
+    with pytest.raises(ParameterError, match=r"4 rows and 5 columns .* transpose the"):
         krippendorff_alpha(turned, level_of_measurement="interval")
     assert krippendorff_alpha(turned, metric="interval").n_items == 4
 
@@ -353,5 +361,5 @@ def test_a_set_of_labels_is_a_category() -> None:
     assert declared.value == fleiss_kappa(text).value
     with pytest.raises(RatingsError, match="row 0, column 1: needs one of 'a' or"):
         fleiss_kappa(sets, categories=["a"])
-    with pytest.raises(RatingsError, match="no semicolon, which separates them"):
+    with pytest.raises(RatingsError, match="a semicolon, which separates them"):
         fleiss_kappa([[{"a;b"}, {"a"}]])

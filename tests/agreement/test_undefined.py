@@ -14,7 +14,7 @@ from masrel.estimates import Estimate
 
 ONE_ITEM, ONE_RATER, ALIKE = [[1, 2]], [[1], [2]], [[3, 3], [3, 3]]
 APART, CONSTANT = [[1, None], [None, 2]], [["a", "a"], ["a", "a"]]
-TOO_FEW = "too few ratings to tell raters"
+TOO_FEW = "too few ratings to separate raters"
 NO_CHANGE, NO_PAIR = "0/0: no item changed", "no item has ratings of two"
 AB = {"categories": ["a", "b"]}
 
@@ -27,16 +27,21 @@ UNDEFINED: list[tuple[str, Any, dict[str, Any], str]] = [
         for table, why in (
             (ONE_ITEM, "fewer than two items"),
             (ONE_RATER, "fewer than two raters"),
-            (ALIKE, "0/0: neither items nor ratings"),
+            (ALIKE, "0/0: there are no differences between items"),
         )
     ),
     ("icc", APART, {}, "no item has two ratings"),
     ("icc mdc", [[1, 2], [3, None]], {}, TOO_FEW),
     ("icc", [[1, None, 2], [None, 3, None]], {}, TOO_FEW),
-    ("icc", [[2, 2, 2], [2, 2, None]], {}, "0/0: neither items nor ratings of an item"),
+    (
+        "icc",
+        [[2, 2, 2], [2, 2, None]],
+        {},
+        "0/0: there are no differences between items",
+    ),
     (
         *("icc", [[1, 2, None, None], [3, 4, None, None], [None, None, 5, 7]], {}),
-        "no residual, and raters whom no item links",
+        "there is no residual, and some raters are not linked",
     ),
     ("mdc", ONE_ITEM, {}, "fewer than two items"),
     ("mdc lin_ccc", ONE_RATER, {}, "fewer than two raters"),
@@ -47,7 +52,7 @@ UNDEFINED: list[tuple[str, Any, dict[str, Any], str]] = [
         for table in (ONE_ITEM, ONE_RATER, APART)
     ),
     *(
-        ("robinson_a", table, {}, "0/0: no variance but between raters")
+        ("robinson_a", table, {}, "0/0: there is no variance except between raters")
         for table in ([[1, 2], [1, 2], [1, 2]], ALIKE)
     ),
     *(

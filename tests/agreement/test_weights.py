@@ -122,13 +122,15 @@ def test_names_of_other_packages_are_taken(elsewhere: str | None, here: str) -> 
     "name", ["fleiss_kappa", "cohen_kappa", "conger_kappa", "light_kappa"]
 )
 def test_weights_to_which_all_ratings_are_alike_are_the_reason(name: str) -> None:
-    alike = "0/0: chance agreement is 1, to the weights all ratings are alike"
-    with pytest.warns(UndefinedStatisticWarning, match="to the weights"):
+    alike = (
+        "0/0: chance agreement is 1, because the weights treat all ratings as the same"
+    )
+    with pytest.warns(UndefinedStatisticWarning, match="because the weights"):
         ones = COEFFICIENTS[name]([[1, 2], [2, 2], [2, 1]], weights=np.ones((2, 2)))
     assert ones.reason == alike
     # of three categories the first two are alike, and the third is not used
     some = [[1, 1, 0], [1, 1, 0], [0, 0, 1]]
-    with pytest.warns(UndefinedStatisticWarning, match="to the weights"):
+    with pytest.warns(UndefinedStatisticWarning, match="because the weights"):
         result = COEFFICIENTS[name](
             [[1, 2], [2, 2]], categories=[1, 2, 3], weights=some
         )

@@ -111,12 +111,14 @@ def test_the_command_that_is_offered_gives_an_interval(
     path = written(tmp_path, SESSIONS, "Ann's ratings.csv")
     call = ("agree", str(path), "--by", "session", "--categories", "0, 1,2", "--csv")
     words, command = masrel(*call).err.splitlines()[-1].split(": masrel ")
-    assert words == "no interval; for other items like these"
+    assert words == (
+        "No interval was asked for. To generalise to other items, add --target items"
+    )
     assert shlex.split(command) == [*call, "--target", "items"]
     done = masrel(*shlex.split(command))
     assert done.code == 0, done.err
     assert all(row["low"] for row in csv.DictReader(io.StringIO(done.out)))
-    assert "no interval" not in done.err
+    assert "No interval" not in done.err
 
 
 def test_verbs_and_options_are_guessed(masrel: Caller, wide: Path) -> None:

@@ -128,9 +128,9 @@ def test_what_the_protocol_says_of_its_size_is_taken(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--items", "30"), "--items: is not of a study"),
-        (("--coefficient", "cohen_kappa"), "--coefficient: is not of a study"),
-        (("--power", "0.8"), "--power: is not of a study"),
+        (("--items", "30"), "--items: is not allowed for a study"),
+        (("--coefficient", "cohen_kappa"), "--coefficient: is not allowed for a study"),
+        (("--power", "0.8"), "--power: is not allowed for a study"),
         (("--toml", "--interval", "t"), "--toml: needs one --value"),
         (("--value", "2"), "needs a line of [[analysis.estimates]] that can be"),
     ],
@@ -162,21 +162,21 @@ def test_a_study_has_its_own_plan(
         ),
         (
             ("--raters", "2", "--items", "9", "--max-cost", "8"),
-            "--max-cost: needs --it",
+            "--max-cost: needs either",
         ),
         (("--raters", "2", "--items", "9,8", "--max-cost", "8"), "--max-cost: is not"),
         (
             ("--raters", "2", "--items", "9,8", "--method", "wald"),
-            "--method: a grid is",
+            "--method: a grid needs",
         ),
         (
             ("--raters", "2", "--items", "9", "--scheduler", "x"),
-            "--scheduler: is of executor",
+            "--scheduler: needs executor",
         ),
         (("--prices", "1,1,1"), "--half-width: needs an aim"),
         (
             ("--prices", "0,1,0", "--half-width", ".2"),
-            "--prices: needs a price of an item",
+            "--prices: needs a price for an item",
         ),
         (("--raters", "2", "--items", "9", "--figure", "x.png"), "--figure: needs sev"),
     ],

@@ -44,7 +44,12 @@ MEASUREMENTS = re.compile("icc_|sem|mdc|lin_ccc|kendall_w|robinson_a")
 MOST_ERRORS, NEVER_ERRORS, ONE_OF = 4.0, 6.0, 1000
 """Joint Monte Carlo errors that one in so many drawn ends may be off, and none."""
 
-OF_DRAWS = ("cut at the end", "standard error of 0", "one value", "and left out")
+OF_DRAWS = (
+    "interval was cut at",
+    "standard error of 0",
+    "the same value",
+    "and left out",
+)
 """Words of notes that come and go with what is drawn."""
 
 DRAWN_KEYS = ("low", "high", "median", "mce", "n_resamples", "n_undefined", "method")

@@ -39,8 +39,11 @@ def test_nothing_changed(seeds: range, tenth: dict[str, dict]) -> None:
         pytest.fail("\n".join([head, *said]), pytrace=False)
 
 
-FEW = "8 items: below 10 the interval may cover less than it says"
-CUT = "cut at the end of the parameter space [-1, 1]"
+FEW = (
+    "8 items: with fewer than 10 the true coverage may be below the level of the "
+    "interval"
+)
+CUT = "the interval was cut at -1 or 1"
 IN_ORDER, TURNED = ({"notes": notes} for notes in ([FEW, CUT], [CUT, FEW]))
 ENDS = {"low": 0.2, "high": 0.6, "mce": [0.003, 0.004], "n_resamples": 1000}
 FAR = ENDS | {"low": 0.2 + 3.0 * 0.003 * 2**0.5}

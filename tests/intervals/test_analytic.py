@@ -34,7 +34,8 @@ def test_logit_interval_by_hand() -> None:
     assert (found.low, found.high) == pytest.approx((low, high), rel=1e-12)
     assert -1 < found.low < estimate.value < found.high < 1
     assert found.notes == (
-        "4 items: below 10 the interval may cover less than it says",
+        "4 items: with fewer than 10 the true coverage may be below "
+        "the level of the interval",
     )
 
 

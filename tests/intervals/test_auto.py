@@ -35,7 +35,7 @@ def chosen(ratings: object, target: Target, **options: object) -> Interval:
         found = estimate("fleiss_kappa", ratings, target=target, **options)  # type: ignore[arg-type]
     assert found.interval is not None
     assert found.interval.target == target
-    assert found.interval.notes[0].startswith("chosen for other ")
+    assert found.interval.notes[0].startswith("method chosen for other ")
     return found.interval
 
 
@@ -135,7 +135,7 @@ def test_perfect_agreement_is_bounded_from_below_by_the_model(
     assert found.kind == "credible"
     assert found.method == f"Dirichlet-multinomial posterior, one-sided, {BY_RULE}"
     assert found.is_one_sided
-    assert "rests on the prior" in found.notes[1]
+    assert "depends on the prior" in found.notes[1]
 
 
 RARE = np.zeros((50, 3), dtype=int)
@@ -162,8 +162,8 @@ def test_rare_categories_have_the_posterior_extended_to_the_estimate() -> None:
     assert (interval.high, interval.median) == (plain.high, plain.median)
     assert plain.low == pytest.approx(0.008, abs=5e-4)
     assert plain.high == pytest.approx(0.693, abs=5e-4)
-    assert "rare (3 items" in interval.notes[0]
-    assert any("extended from 0.008" in note for note in interval.notes)
+    assert "are rare (3 items" in interval.notes[0]
+    assert any("posterior, 0.008, is extended" in note for note in interval.notes)
 
 
 def test_the_rule_counts_items_outside_the_commonest_category() -> None:

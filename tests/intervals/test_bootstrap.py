@@ -59,8 +59,8 @@ def test_a_position_that_is_met_exactly_gives_the_middle() -> None:
     assert (found.low, found.high) == (0.25, 0.75)
     just_inside = exact("percent_agreement", table, level=0.49)
     assert (just_inside.low, just_inside.high) == (0.5, 0.5)
-    assert just_inside.notes[-1].startswith("both ends are one value")
-    assert not any(note.startswith("both ends") for note in found.notes)
+    assert just_inside.notes[-1].startswith("both limits are the same value")
+    assert not any(note.startswith("both limits") for note in found.notes)
     beyond = exact("percent_agreement", table, level=0.51)
     assert (beyond.low, beyond.high) == (0.0, 1.0)
 

@@ -296,7 +296,7 @@ def test_independent_clusters_add_their_variances() -> None:
     test = difference_test(*asked, clusters=labels, **options)
     assert test.df[0] == pytest.approx(variance**2 / df, rel=1e-9)
     for wrong, why in (
-        ((labels[0], ["a1", *labels[1][1:]]), "other clusters, got 'a1' in both"),
+        ((labels[0], ["a1", *labels[1][1:]]), "different clusters, got 'a1' in both"),
         (labels[0], "a pair of sequences"),
     ):
         with pytest.raises(ParameterError, match=why):
@@ -319,5 +319,5 @@ def test_rare_categories_in_clusters_are_warned_of(
     assert interval is not None
     notes = [str(warning.message) for warning in caught]
     assert notes == list(interval.notes[1:])
-    expected = "4 items with a rating outside the commonest category: below 30 the"
+    expected = "4 items with a rating outside the commonest category: with fewer than"
     assert [note.startswith(expected) for note in notes] == [True] * is_rare

@@ -158,7 +158,9 @@ METHODS: dict[str, Callable[[], object]] = {
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_warning_points_to_who_asked(method: str) -> None:
-    with pytest.warns(SmallSampleWarning, match="5 items: below 1[06]") as caught:
+    with pytest.warns(
+        SmallSampleWarning, match="5 items: with fewer than 1[06]"
+    ) as caught:
         METHODS[method]()
     assert [warning.filename for warning in caught] == [__file__]
     # the line within this file, not that of the test which calls it
@@ -181,7 +183,10 @@ def test_a_bootstrap_warns_below_enough_units(unit: str, enough: int) -> None:
             interval = bootstrap(
                 "fleiss_kappa", table, categories=range(3), rng=1, **options
             )
-        note = f"{n} {unit}: below {enough} the interval may cover less than it says"
+        note = (
+            f"{n} {unit}: with fewer than {enough} the true coverage may be below "
+            "the level of the interval"
+        )
         assert [str(w.message) for w in caught] == [note] * (n < enough)
         assert (note in interval.notes) == (n < enough)
 

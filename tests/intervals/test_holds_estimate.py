@@ -156,7 +156,7 @@ def test_an_interval_holds_its_estimate(method: str, coefficient: str) -> None:
         if method.endswith(OF_RATERS) and (entry.n_raters[1] == 2 or is_of_items):
             match = "at least 3 raters"
             if is_of_items:
-                match = "it has no other" if is_chosen else "items are left out"
+                match = "needs target" if is_chosen else "are left out or drawn"
             with pytest.raises(ParameterError, match=match):
                 PROMISE[method](coefficient, ratings, **options)
             continue

@@ -69,7 +69,7 @@ def test_the_interval_that_comes_with_it_answers_with_a_note() -> None:
         found = estimate("icc_a1", RATINGS, target=target).interval  # type: ignore[arg-type]
         assert found is not None
         assert (found.low, found.high, found.target) == (own.low, own.high, "both")
-        assert found.notes[-1].startswith(f"asked for other {target}: ")
+        assert found.notes[-1].startswith("the only interval available is for other ")
     # the rule says its name, and the one before had the ends from F where all are there
     of: Any
     for of, rule, kind in (
@@ -85,7 +85,7 @@ def test_the_interval_that_comes_with_it_answers_with_a_note() -> None:
         assert found.method.startswith(f"{by.method}, chosen by auto-2026.")
     assert estimate("kendall_w", RATINGS, target="items").interval is not None
     with pytest.raises(
-        ParameterError, match='generalises to other items, which is "it'
+        ParameterError, match='generalises to other items: needs target "it'
     ):
         estimate("icc_c1", RATINGS, target="both")
     # by formula: from F for its own target, by the error for other items alone

@@ -122,11 +122,15 @@ def test_another_program_found_the_same_for_table_v() -> None:
     ("table", "target", "reason"),
     [
         ([["a", "a", "a"]] * 3, "items", "the estimate itself is undefined"),
-        ([["a", "a", "a"], ["b", "b", "b"]], "items", "left out the estimate is"),
-        ([["a", "a", "a"], ["b", "b", "b"]], "raters", "leaves the estimate as it is"),
+        (
+            [["a", "a", "a"], ["b", "b", "b"]],
+            "items",
+            "the estimate is undefined when one",
+        ),
+        ([["a", "a", "a"], ["b", "b", "b"]], "raters", "the estimate stays the same"),
         # κ of one item is −1/(raters − 1), whatever they say: only rounding moves it
-        ([["a"] * 6 + ["b"] * 2], "raters", "leaves the estimate as it is"),
-        ([["a", "b", "c", "a", "b"]], "raters", "leaves the estimate as it is"),
+        ([["a"] * 6 + ["b"] * 2], "raters", "the estimate stays the same"),
+        ([["a", "b", "c", "a", "b"]], "raters", "the estimate stays the same"),
         # any two of these four agree on a third of the items, as chance does: κ is 0
         (
             [
@@ -134,9 +138,9 @@ def test_another_program_found_the_same_for_table_v() -> None:
                 for item in "aaaa abbc accb babb bbca bcac cacc cbab ccba".split()
             ],
             "raters",
-            "leaves the estimate as it is",
+            "the estimate stays the same",
         ),
-        ([["a", "b", "a"]], "items", "left out the estimate is undefined"),
+        ([["a", "b", "a"]], "items", "the estimate is undefined when one"),
     ],
 )
 def test_where_it_cannot_say_it_says_why(

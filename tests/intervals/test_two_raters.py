@@ -148,7 +148,7 @@ def test_items_of_a_single_rating_are_left_out() -> None:
     assert posterior("cohen_kappa", ratings, target="items", model="table") == whole
     # they tell of chance agreement by Fleiss' kappa, but not here: a note says so
     result = posterior("fleiss_kappa", ratings, target="items", model="table")
-    assert "left out, items of a single rating: 2" in result.notes
+    assert "items with a single rating, left out: 2" in result.notes
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_items_of_a_single_rating_are_left_out() -> None:
         (
             [["a", "b"]],
             {"categories": ["a", "b"], "weights": np.ones((2, 2))},
-            "the weights count nothing as disagreement",
+            "the weights treat nothing as disagreement",
         ),
         (
             [[-1, 1], [1, 1]],

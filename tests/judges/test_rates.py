@@ -208,7 +208,7 @@ def test_rates_side_by_side_are_those_of_their_functions() -> None:
 @pytest.mark.parametrize(
     ("counts", "reason"),
     [
-        ({"pp": 12, "-p": 5, "-f": 5}, "the labelled items are all of one kind"),
+        ({"pp": 12, "-p": 5, "-f": 5}, "all labelled items have the same label"),
         ({"pp": 5, "pf": 5, "fp": 6, "ff": 5, "-f": 5}, "no better than chance"),
         ({"pp": 40, "ff": 55, "fp": 5, "-f": 4000}, None),
     ],

@@ -105,12 +105,20 @@ OF_GRADES = ["Use of each grade", "Agreement on each grade", "Ratings of "]
         (
             ratings(3) * 1.37 + np.arange(36).reshape(12, 3) / 100.0,
             MEASURED,
-            ["ICC(A,1) of every two raters", "Ratings of ", "Variance of a rating"],
+            [
+                "ICC(A,1) of every two raters",
+                "Ratings of ",
+                "Shares of the variance of a rating",
+            ],
         ),
         (
             ratings(2) * 1.37 + np.arange(24).reshape(12, 2) / 100.0,
             MEASURED,
-            ["Difference of A and B", "Ratings of ", "Variance of a rating"],
+            [
+                "Difference between A and B",
+                "Ratings of ",
+                "Shares of the variance of a rating",
+            ],
         ),
         (
             pd.DataFrame({"item": list("abcdef"), "A": ["x"] * 6, "B": ["x"] * 6}),
@@ -205,17 +213,17 @@ GROUPS = "site,patient,Kim,Lee\n" + "".join(
 @pytest.mark.parametrize(
     ("command", "first", "methods"),
     [
-        (("compare", "--by", "site"), "Differences of agreement", "(Holm, 1979)"),
+        (("compare", "--by", "site"), "Differences in agreement", "(Holm, 1979)"),
         (
             ("diagnose", "--ignore", "site", "--target", "items"),
-            "What each rater adds",
+            "Fleiss' κ with and without each rater",
             "(Korn & Graubard, 1998)",
         ),
         (("limits", "--ignore", "site"), "Limits of agreement", "Carkeet, 2015)"),
         (
             ("agree", "--ignore", "site", "--symmetry"),
             "Agreement of the raters",
-            "tested: Bowker, Stuart-Maxwell and Bhapkar (Bowker, 1948; Maxwell, 1970;",
+            "tested by Bowker, Stuart-Maxwell and Bhapkar (Bowker, 1948; Maxwell,",
         ),
     ],
 )
@@ -269,7 +277,11 @@ def test_simulated_ratings_are_labelled_everywhere() -> None:
     ("name", "group", "message"),
     [
         ("scatter", "", "picture: needs one of forest, pairs"),
-        ("components", "", "picture: these ratings have no components; it needs"),
+        (
+            "components",
+            "",
+            "picture: 'components' is not available for these ratings; it needs",
+        ),
         ("pairs", "east", "group: needs one of "),
     ],
 )

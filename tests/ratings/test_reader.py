@@ -402,7 +402,7 @@ def test_standard_input_and_pipes(
     ("error", "words"),
     [
         (KeyboardInterrupt(), "stopped by Ctrl-C"),
-        (MemoryError("2 GiB"), "needs more memory than there is. 2 GiB"),
+        (MemoryError("2 GiB"), "there is not enough memory. 2 GiB"),
     ],
 )
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from masrel.intervals._quadrature import beta_nodes
 from masrel.intervals.latent._model import Traits
 
 Items = Literal["fixed", "random"]
-"""Whether kappa is for these items, or for new ones of their population."""
+"""Whether kappa is for these items, or for new items of their population."""
 
 _MAX_W = 5.5  # where the sum over a rater's w ends, on either side
 _N_NODES = 69  # of a tanh-sinh quadrature

@@ -39,7 +39,7 @@ _MANY = 1_000  # ratings from which half as many chains do: a step then costs by
 _MIN_CURVATURE = 0.2  # least curvature that is believed
 
 Progress = Callable[[int, int], object]
-"""Called with how many steps are made, and how many are expected in all."""
+"""Called with the number of steps made and the number expected in all."""
 
 _Proposal = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
 

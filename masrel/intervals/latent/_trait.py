@@ -255,10 +255,13 @@ class _Ratings:
         refuse(
             (
                 not coded.declared and isinstance(coded.categories[0], str),
-                "categories: the model needs the declared scale in order, the ratings "
-                "are text",
+                "categories: the model needs the declared scale in order, because the "
+                "ratings are text",
             ),
-            (coded.n_categories < 2, "categories: the model needs two, got one"),
+            (
+                coded.n_categories < 2,
+                "categories: the model needs two or more, got one",
+            ),
         )
         rated = coded.codes >= 0
         rows, columns = (np.flatnonzero(rated.any(axis=axis)) for axis in (1, 0))
@@ -271,14 +274,14 @@ class _Ratings:
             ),
             (
                 rows.size < 2,
-                "ratings: the model needs two items to say how far apart they are, got "
+                "ratings: the model needs two items or more with ratings, got "
                 f"{rows.size}",
             ),
             (
                 (highest <= lowest).all(),
-                "ratings: no two raters disagree on any item, so that nothing tells "
-                "how small biases and noises are; masrel.intervals.posterior bounds "
-                "kappa here",
+                "ratings: no two raters disagree on any item, so biases and noises "
+                "cannot be estimated; masrel.intervals.posterior gives a bound for "
+                "kappa",
             ),
             error=RatingsError,
         )

@@ -74,7 +74,7 @@ def test_no_input_is_written_over(study: Path, tmp_path: Path, masrel: Caller) -
     for call in calls:
         done = masrel(*call)
         assert done.code == 2, call
-        assert "this one is read" in done.err or "model file" in done.err
+        assert "this one is an input" in done.err or "model file" in done.err
         assert len(done.err.splitlines()) == 1, call
     assert contents(tmp_path) == before
 
@@ -88,7 +88,7 @@ def test_a_model_file_of_the_protocol_is_an_input(study: Path, masrel: Caller) -
     edit(study / "protocol.toml", "[[raters]]", f"{entry}[[raters]]", 1)
     done = masrel("analyze", study, "--json", study / "models" / "D01.toml")
     assert done.code == 2
-    assert "this one is read" in done.err
+    assert "this one is an input" in done.err
 
 
 def test_default_outputs_do_not_leave_the_study(

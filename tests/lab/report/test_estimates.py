@@ -147,8 +147,8 @@ def test_intervals_made_alike_share_a_meaning_and_wide_ones_are_not_shown(
     ]  # fmt: skip
     assert cells[4]["low"] == "-0.2"  # the file has it
     assert text.count("0.626 [−0.2") == 1  # in the forest
-    assert text.count("about 95 % of the intervals") == 3
-    assert text.count("with probability 99.9 %") == 1
+    assert text.count("about 95 % of intervals") == 3
+    assert text.count("a 99.9 % probability") == 1
 
 
 def test_an_estimate_has_a_title_of_its_own_or_one_that_no_other_has(
@@ -190,39 +190,41 @@ def test_what_a_reader_must_know_is_below_the_table(tmp_path: Path) -> None:
         assert note in text
 
 
-OTHER_ITEMS = "these raters graded other models like these"
-OTHER_RATERS = "the same models were put to other raters like these"
-BOTH = "other raters graded other models, both like these"
+OTHER_ITEMS = "with the same raters and other models like these"
+OTHER_RATERS = "with other raters like these and the same models"
+BOTH = "with other raters and other models like these"
+REPEATED = "if the study were repeated many times"
 GIVEN = "given these ratings, the prior and"
+PROBABLY = "there is a 95 % probability that the value for"
 MEANT: list[tuple[dict[str, Any], str]] = [
     ({"kind": "credible", "target": "items"},
      "95 % credible interval, jackknife, t(7): generalises to other models like these: "
-     "given these ratings and the prior, the value that would be "
-     f"found if {OTHER_ITEMS}, without end, lies inside with probability 95 %."),
+     f"given these ratings and the prior, {PROBABLY} these raters on all models like "
+     "these lies in this interval."),
     ({"kind": "credible", "target": "both"},
-     f"{GIVEN} raters who differ by chance alone, the value that would be found if "
-     f"{BOTH}, without end, lies inside"),
+     f"{GIVEN} the assumption that raters differ by chance alone, {PROBABLY} all "
+     "raters and models like these lies in this interval"),
     ({"kind": "credible", "target": "raters", "raters_differ": True},
-     f"{GIVEN} the model of how raters differ, the value that would be found if "
-     f"{OTHER_RATERS}, without end, lies inside"),
+     f"{GIVEN} the model of how raters differ, {PROBABLY} all raters like these on "
+     "these models lies in this interval"),
     ({"kind": "credible", "target": "items", "is_one_sided": True},
      "credible bound, jackknife, t(7): generalises to other models like these: given "
-     "these ratings and the prior, the value that would be found "
-     f"if {OTHER_ITEMS}, without end, lies above the lower end"),
+     f"these ratings and the prior, {PROBABLY} these raters on all models like these "
+     "lies above the lower end"),
     ({"target": "both"},
      "95 % CI, jackknife, t(7): generalises to other models and raters like these"
-     f": if {BOTH}, again and again, about 95 % of the intervals "
-     "made this way would hold the value that all such studies together would give."),
+     f": {REPEATED} {BOTH}, about 95 % of intervals computed this way would contain "
+     "the value that all these studies together would give."),
     ({"unit": "items", "units_are": "left out", "target": "items"},
      "(from leaving out one model at a time): generalises to other models like these: "
-     f"if {OTHER_ITEMS},"),
+     f"{REPEATED} {OTHER_ITEMS},"),
     ({"unit": "both", "units_are": "left out", "target": "both"},
      "(from leaving out models and raters, one at a time): generalises to"),
     ({"unit": "raters", "units_are": "drawn"},
      "(from raters drawn with replacement): generalises to other raters like these: "
-     f"if {OTHER_RATERS},"),
+     f"{REPEATED} {OTHER_RATERS},"),
     ({"unit": "clusters", "target": "items"},
-     "if these raters graded other clusters of models like these,"),
+     f"{REPEATED} with the same raters and other clusters of models like these,"),
 ]  # fmt: skip
 
 
