@@ -153,9 +153,11 @@ def corrected_rate(
     RateEstimate
         Rogan and Gladen's rate with Lang and Reiczigel's interval.
 
-    Raises ------ ParameterError If a share is outside [0, 1], a number below 1, or
-    sensitivity and specificity add up to 1 or less, with which the judge gives no
-    information about the rate.
+    Raises
+    ------
+    ParameterError
+        If a share is outside [0, 1], a number below 1, or sensitivity and specificity
+        add up to 1 or less: such a judge gives no information about the rate.
 
     Warns
     -----
@@ -369,9 +371,12 @@ def rate_estimates(
     RatingsError
         If fewer than 2 items have both a label and a grade of the judge.
 
-    Warns ----- UndefinedStatisticWarning If all labelled items have the same label, or
-    the judge does no better in them than chance: the rate of Rogan and Gladen is
-    ``nan``. Or if its interval lies outside [0, 1].
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If all labelled items have the same label, or the judge does no better in them
+        than chance: the rate of Rogan and Gladen is ``nan``. Or if its interval lies
+        outside [0, 1].
 
     See Also
     --------
