@@ -261,11 +261,9 @@ def _facts(names: Sequence[str], wrong: set[int], named: set[int]) -> dict[str, 
         [name for k, name in enumerate(names) if (k in wrong) is is_out]
         for is_out in (True, False)
     )
-    ignored = f"--ignore{few(out)} leaves such columns aside, " * bool(
-        rest and few(out)
-    )
+    ignored = f"--ignore{few(out)} ignores such columns, " * bool(rest and few(out))
     is_gold = len(out) == 1 and called_gold(out[0])
-    held = f"; masrel diagnose --reference{few(out)} holds the others against it"
+    held = f"; masrel diagnose --reference{few(out)} compares the others with it"
     return {
         "columns": listed(out, _SHOWN),
         "why": "name" if wrong <= named else _APART,
@@ -285,7 +283,7 @@ def refuse_named(sheet: Sheet, layout: Layout, options: Reading) -> None:
             "no raters",
             columns=listed(wrong, _SHOWN),
             why="name",
-            advice=f"--ignore{few(wrong)} leaves such columns aside",
+            advice=f"--ignore{few(wrong)} ignores such columns",
         )
 
 

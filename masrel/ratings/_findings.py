@@ -11,16 +11,16 @@ from masrel._input import refuse
 from masrel.errors import RatingsError
 
 Repeated = Literal["error", "first", "last", "mean", "each"]
-"""What becomes of a second grade of an item by the same rater."""
+"""What to do with a second grade of an item by the same rater."""
 
 USUAL_MISSING = ("", "NA")
-"""Cells that stand for a missing grade unless the scale has them."""
+"""Cells that mean a missing grade unless the scale has them."""
 
 _SEPARATORS = {"tab": "\t", "\\t": "\t", "space": " ", "blanks": " ", "auto": None}
 _NO_MARKS = "+-0123456789eE"  # letters of numbers
 _SHOWN = 6  # texts that a message lists
 MOST_CODES = 5
-"""Codes of missing grades that a message suggests at once."""
+"""Number of codes of missing grades that a message suggests at once."""
 _LONGEST = 60  # letters of a text that it shows
 
 
@@ -370,12 +370,13 @@ _TEXTS = {
     "{first!r}",
     "width": "{where}: needed {width} cells, as the first line has, got {n}: {cells!r}",
     "open quote": "{where}: a quote that is opened is not closed",
-    "names again": "holds the names of the columns once more: delete it; --no-header "
-    "if the first line is a row like the others",
+    "names again": "holds the names of the columns a second time: delete that line; "
+    "if the first line is a row like the others, add --no-header",
     "no name": "{where}: needed a name for column {column}, got none{hint}",
     "same name": "{where}: needed different names of the columns that are used, "
     "{column!r} is there twice{hint}",
-    "titles": "needed names of columns, got {got!r}: {option} takes them from below",
+    "titles": "needed names of columns, got {got!r}: {option} takes them from a line "
+    "below",
     "no line": "--skip, --header: there are no names in {unit} {n} or below",
     "no lines": "--skip, --header: needed text or a workbook, with names in a line",
     "note below": "{where} is left out, since it stands alone below an empty one: "
@@ -423,9 +424,9 @@ _TEXTS = {
     "two roles": "{options}: needed each column once, got {column!r} twice",
     "role twice": "{where}: needed one column for the {role}, got {names}: --{role} "
     "chooses one, --ignore leaves a column aside{hint}",
-    "unknown role": "{where}: looks like one row a rating ({known}): needs {needed} to "
-    "name columns, which are {columns}; if columns are raters, --raters names them, if "
-    "they are items, --transpose{hint}",
+    "unknown role": "{where}: looks like one row per rating ({known}). Found columns "
+    "{columns}: name columns with {needed}; if columns are raters, name them with "
+    "--raters; if they are items, add --transpose{hint}",
     "no rater": "{where}: needed columns of raters, or of categories, got none",
     "span columns": "{begin!r} and {end!r} look like where spans begin and end, parts "
     "of a text or a recording, which masrel spans reads; --item names the items, if "
@@ -468,13 +469,13 @@ _TEXTS = {
     "name the item otherwise",
     # warnings of columns
     "apart": "no value in common with the other columns: {columns}: {advice}",
-    "many raters": "{n} columns count as raters of {n_items} items: --transpose if a "
-    "row is a rater",
-    "second header": "{where} holds grades that occur nowhere else: {advice}",
+    "many raters": "{n} columns are read as raters of {n_items} items; if each row is "
+    "a rater, add --transpose",
+    "second header": "{where} has grades that occur nowhere else: {advice}",
     "numbered": "no item was rated twice: {columns} may number the rows, --item names "
     "the column of the items",
-    "alike": "{kind} that differ by spelling alone are counted as different: {names}",
-    "summary": "{names} counts as an item: if it is a comment, or sums up other rows, "
+    "alike": "{kind} that differ only in spelling are counted as different: {names}",
+    "summary": "{names} is read as an item; if it is a comment or sums up other rows, "
     "delete it",
     "no grade of": "{rater!r} has no grade",
     "qualtrics": "{first} to {last} are questions and import ids of Qualtrics, no "
@@ -496,7 +497,8 @@ _TEXTS = {
     "sum row": "{where}: is the sum of the rows above: delete it",
     "category or item": "the first column, {column!r}, may name items or be a "
     "category: --item {name} if it names them, --no-item if not",
-    "items twice": "{column!r} names items more than once: each row counts as an item",
+    "items twice": "{column!r} names items more than once; each row is counted as a "
+    "separate item",
     # grades
     "no grades": "needed at least one grade, got none",
     "other grade": "needed one of {scale}, got {got}{hint}",
@@ -518,14 +520,13 @@ _TEXTS = {
     "'{grade}': --categories with the scale in order tells",
     "truth": "{got} beside 0 or 1 and others may be these numbers, or grades of their "
     "own: write them alike, or --categories with all grades of the scale",
-    "alike grades": "grades that differ by spelling alone are counted as different: "
+    "alike grades": "grades that differ only in spelling are counted as different: "
     "{grades}",
-    "too near": "{one} and {other} are too near to be told apart as numbers, so that "
-    "grades weigh by their place in the scale",
+    "too near": "{one} and {other} are too close to differ as numbers, so weights use "
+    "the place of each grade in the scale",
     "measurements": "{n} different numbers in {n_ratings} ratings look like "
-    "measurements: percent agreement and unweighted kappas count only those that are "
-    "equal; --coefficients icc_a1 or --metric interval weigh how far they lie from "
-    "each other",
+    "measurements: percent agreement and unweighted kappas count only equal numbers; "
+    "--coefficients icc_a1 or --metric interval take the distances into account",
     "far": "{grades}: far from the other grades{hint}",
     "no number": "no number: {got} ({where}), so that all grades are text{hint}",
     "number": "a number among grades that are text: {got} ({where}){hint}",

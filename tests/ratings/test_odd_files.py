@@ -413,9 +413,9 @@ WARNED: dict[str, Any] = {
     ),
     "too near for floats": (
         "item,Kim,Lee\nA,9007199254740992,9007199254740993\nB,1,1\n",
-        "too near",
+        "too close",
     ),
-    "too small for floats": ("item,Kim,Lee\nA,0,1e-400\nB,1,1\n", "too near"),
+    "too small for floats": ("item,Kim,Lee\nA,0,1e-400\nB,1,1\n", "too close"),
     "points beside decimal commas": (
         "item;Kim;Lee\nA;1,5;1.5\nB;2;2\nC;1,5;2\n",
         "'1,5'.*'1.5'",

@@ -245,11 +245,11 @@ def test_groups_and_sessions_are_parts(
         ),
         (TWICE.replace("1", "a"), {"repeated": "mean"}, "--repeated mean"),
         # raters, or what is left over
-        (LONG.replace("rater,grade", "wer,score"), {}, "needs --rater"),
+        (LONG.replace("rater,grade", "wer,score"), {}, "name columns with --rater"),
         (
             LONG.replace("item,rater", "subject,outcome"),
             {"item": "subject", "grade": "grade"},
-            "needs --rater",
+            "name columns with --rater",
         ),
         (NUMBERED, {}, "--no-header"),  # though they are no grades of other rows
         (TWICE, {"repeated": "mean", "categories": ["1", "2", "3"]}, "declared scale"),
