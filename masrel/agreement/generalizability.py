@@ -281,7 +281,7 @@ def g_study(
     >>> {source: round(part, 3) for source, part in study.components.items()}
     {'person': 1.667, 'rater': -0.167, 'person × rater': 1.167}
     >>> study.notes
-    ('rater is negative (-0.167): taken for 0 in reliability',)
+    ('rater is negative (-0.167) and treated as 0 in reliability',)
     >>> round(study.d_study(rater=4).dependability, 3)
     0.851
     """

@@ -81,8 +81,9 @@ def lacking(old: Any, new: Any, where: str = "") -> list[str]:
             for key in kept
             for place in lacking(old[key], new.get(key, "nothing"), f"{where}.{key}")
         ]
-    if where.endswith("notes") and isinstance(old, list):
-        old, new = sorted(old), sorted(new)  # their order may change
+    if where.endswith((".notes", ".sentence")):
+        # words may change, and are held by transcripts; that something is said may not
+        old, new = [bool(of) for of in (old, new)]
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         pairs = enumerate(zip(old, new, strict=True))
         return [p for n, (a, b) in pairs for p in lacking(a, b, f"{where}[{n}]")]

@@ -98,7 +98,7 @@ def test_a_signal_is_an_emergency_stop_while_the_arm_turns(
 def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
     done = masrel("device", "friction", *EMULATED)
     assert done.code == 2
-    assert "say --arm-is-free" in done.err
+    assert "add --arm-is-free" in done.err
 
 
 @pytest.mark.parametrize(
