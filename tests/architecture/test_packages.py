@@ -31,7 +31,7 @@ USES = {
         "0.368",
     ),
     "scipy": (
-        "intervals/_question.py",
+        "agreement/_engine.py",
         IN_PYTHON
         + "from masrel.intervals import jackknife\n"
         + "print(jackknife('fleiss_kappa', ratings, target='raters',\n"

@@ -157,7 +157,7 @@ def test_the_size_from_which_on_an_assurance_holds(
     plan = sample_size(study)
     assert plan.n_items == reference["stable"]
     assert plan.assurance == pytest.approx(reference["p_at_stable"], rel=1e-8)
-    first = f"{reference['first']} items reach it first"
+    first = f"{reference['first']} items reach the aim first"
     assert any(first in note for note in plan.notes) == (
         reference["first"] < reference["stable"]
     )

@@ -332,7 +332,7 @@ def test_the_command_serves_a_study_once_says_what_is_risked_and_ends_at_a_signa
             assert server.end() == 0
         server = Server(study, "--host=0.0.0.0", at_a_terminal=False)
         assert "\N{UPPER HALF BLOCK}" not in server.text
-        assert server.text.count("--host 0.0.0.0 without --tls: whoever is in") == 1
+        assert server.text.count("--host 0.0.0.0 without --tls: anybody in") == 1
         assert server.end(signal.SIGTERM) == 0
     finally:
         server.end(signal.SIGKILL)
