@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 Lines = Sequence["Line"]
 
-WHATS = ("value", "standard error")
+QUANTITIES = ("value", "standard error")
 _NEAREST = 0.5  # ulp
 _MISSES = ("no answer", "crash, nan")
 _BOUNDS = {"≤ 4 ulp": 4.0, "≤ 10⁴ ulp": 1e4, "≤ 10⁸ ulp": 1e8, "more": math.inf}
@@ -22,7 +22,7 @@ _BOUNDS = {"≤ 4 ulp": 4.0, "≤ 10⁴ ulp": 1e4, "≤ 10⁸ ulp": 1e8, "more":
 def rows(lines: Lines) -> Iterator[dict[str, object]]:
     """Yield a row a number that a package offers."""
     for line in lines:
-        for what in WHATS:
+        for what in QUANTITIES:
             exact = line.exact(what)
             for package, off in line.off(what).items():
                 if off.is_offered:
@@ -78,7 +78,7 @@ def _error(line: "Line") -> float:
 
 
 def _tally(lines: Lines) -> Iterator[list[object]]:
-    for what in WHATS:
+    for what in QUANTITIES:
         defined = [line for line in lines if line.exact(what) is not None]
         for package in ("masrel", *PACKAGES):
             offs = [of.off(what)[package] for of in defined if package in of.off(what)]
