@@ -303,18 +303,22 @@ class PlannedDesign:
         How many are measured.
     sizes : mapping of str to int
         Levels of each facet; of a nested one within each level of the facet above.
+    of : {"dependability", "generalizability"}
+        Which coefficient: Φ, or Eρ².
     low, high : float
-        Mean ends of the interval of the coefficient.
-    chance : float or None
-        Of a low end that reaches the aim, where there is one.
+        Mean ends of its interval.
+    aim, chance : float or None
+        What the low end should reach, and how often it does.
     monte_carlo_error : float
         Standard error of the chance, or of the mean low end.
     """
 
     n_persons: int
     sizes: Mapping[str, int]
+    of: Literal["dependability", "generalizability"]
     low: float
     high: float
+    aim: float | None
     chance: float | None
     monte_carlo_error: float
 
@@ -401,6 +405,8 @@ def design_precision(
     return PlannedDesign(
         n_persons=n_persons,
         sizes=dict(sizes),
+        of=of,
+        aim=aim,
         low=float(ends[:, 0].mean()),
         high=float(ends[:, 1].mean()),
         chance=None if aim is None else float(reached.mean()),

@@ -3,6 +3,7 @@
 In: a `RatingsFile` and how estimates are made. Out: a row for every coefficient.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
@@ -633,7 +634,9 @@ def _estimate(
             ratings, categories=ratings.categories, weights=weights, level=level
         )
         # one that comes with the coefficient knows of no clusters
-        return replace(result, interval=None) if questions.clusters else result
+        if questions.clusters:
+            result = replace(result, interval=None, standard_error=math.nan)
+        return result
     ask: Any = {
         "target": questions.target,
         "categories": ratings.categories,

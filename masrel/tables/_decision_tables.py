@@ -64,7 +64,7 @@ _CAPTIONS = {
 }
 
 
-def _columns(study: GStudy) -> dict[str, list[Column]]:
+def _columns(study: GStudy, plans: Sequence[PlannedDesign]) -> dict[str, list[Column]]:
     # of each table
     reliability = [
         column
@@ -98,8 +98,16 @@ def _columns(study: GStudy) -> dict[str, list[Column]]:
         "planned": [
             Column(key="n_persons", heading=study.of),
             *(Column(key=name, heading=name) for name in study.facets),
-            *_interval_columns(""),
-            Column(key="chance", heading="Chance", digits=3),
+            *(
+                Column(key=end, heading=f"{_COEFFICIENTS[plan.of]} {end}", digits=3)
+                for plan in plans[:1]
+                for end in ("low", "high")
+            ),
+            *(
+                Column(key="chance", heading=f"Low ≥ {plan.aim:g}", digits=3)
+                for plan in plans[:1]
+                if plan.aim is not None
+            ),
             Column(key="monte_carlo_error", heading="± MC", digits=3),
         ],
     }
@@ -143,7 +151,7 @@ def study_tables(
     )
     first, *more = (
         table_of(name, _CAPTIONS[name], of, rows[name], hide_empty=True, data=data)
-        for name, of in _columns(study).items()
+        for name, of in _columns(study, plans).items()
         if name in rows
     )
     document: Row = {

@@ -139,4 +139,4 @@ def test_teeth_are_measured_in_patients(masrel: Caller, tmp_path: Path) -> None:
     ]
     assert plans[0]["low"] < plans[1]["low"] < design["dependability"]
     shown = masrel(*call, "--persons", "30", "--aim", "0.6").out
-    assert "Intervals to expect in future studies" in shown
+    assert "Φ low  Φ high  Low ≥ 0.6" in shown

@@ -137,6 +137,9 @@ def test_clusters_are_left_out(masrel: Caller, tmp_path: Path, kind: Any) -> Non
         assert (ends["low"], ends["high"]) == pytest.approx(
             (interval.low, interval.high)
         )
+    # without clusters Lin's concordance has an error, which knows of none
+    _, concordance = answers(masrel, "estimates", file, *columns)
+    assert concordance["standard_error"] is None
     shown = masrel("limits", file, *columns, *of_kind, "--explain").out
     assert "leaving out one cluster at a time" in shown
     assert "MOVER" not in shown
