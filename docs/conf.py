@@ -71,6 +71,7 @@ html_static_path = ["_static", f"{_MATHJAX}/static/mathjax/{mathjax_path}"]
 html_favicon = html_logo = "_static/icon.svg"
 html_baseurl = _META["urls"]["Documentation"] if _HAS_ADDRESS else ""
 html_extra_path = ["robots.txt"]
+html_sidebars = {"have_ratings": [], "run_study": []}  # nothing lies below these
 html_show_sourcelink = False
 html_css_files = ["site.css"]
 html_search_scorer = str(DOCS / "_static/scorer.js")
