@@ -188,9 +188,10 @@ def _parse_line(path: Path, number: int, line: bytes) -> tuple[Event, object]:
                     f"{path}: line {number}: {name} needs text, a number, true, false "
                     f"or null, or objects of these, got {entry!r}"
                 )
-    return Event(
+    event = Event(
         line=number, kind=kind, time_utc=time_utc, fields=MappingProxyType(fields)
-    ), document["previous"]
+    )
+    return event, document["previous"]
 
 
 def check_kinds(
@@ -432,7 +433,7 @@ def _is_event(path: Path, number: int, line: bytes, previous: str) -> bool:
 
 
 def _check_fact(path: Path, kind: str, name: str, fact: object) -> None:
-    for is_broken, needs in (
+    rules = (
         (
             fact is not None and not isinstance(fact, str | int | float),
             f"text, a number, true, false or null, got {type(fact).__name__}",
@@ -446,7 +447,8 @@ def _check_fact(path: Path, kind: str, name: str, fact: object) -> None:
             and any("\ud800" <= sign <= "\udfff" for sign in fact),
             f"valid Unicode text, got {fact!a}",
         ),
-    ):
+    )
+    for is_broken, needs in rules:
         if is_broken:
             raise SessionLogError(f"{path}: event {kind!r}: {name} needs {needs}")
 

@@ -251,12 +251,7 @@ def _parts(value: object) -> list[object]:
 def toml_lines(table: Mapping[str, Any], place: str = "") -> Iterator[str]:
     """Give the lines of a TOML file; ValueError says what it cannot hold."""
     # what is no table comes first, so that it does not belong to one
-    parts = {
-        name: value
-        for name, value in table.items()
-        for entries in [value if isinstance(value, list) and value else [value]]
-        if all(isinstance(entry, Mapping) for entry in entries)
-    }
+    parts = {name: value for name, value in table.items() if _is_table(value)}
     for name, value in table.items():
         if name not in parts:
             yield f"{_toml_key(name)} = {_toml_value(value)}"
@@ -267,6 +262,11 @@ def toml_lines(table: Mapping[str, Any], place: str = "") -> Iterator[str]:
         else:
             for entry in value:
                 yield from ("", f"[[{where}]]", *toml_lines(entry, where))
+
+
+def _is_table(value: object) -> bool:
+    entries = value if isinstance(value, list) and value else [value]
+    return all(isinstance(entry, Mapping) for entry in entries)
 
 
 def _toml_key(name: str) -> str:

@@ -17,7 +17,6 @@ from datetime import date
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Literal
 
 import masrel
@@ -25,14 +24,16 @@ from masrel._files import write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_TABLE, read_regular
-from masrel.lab.analysis import analyze
+from masrel.lab.analysis import Analysis, analyze
 from masrel.lab.conduct._plan_versions import plan_changes, plan_versions
 from masrel.lab.progress import (
+    RaterProgress,
+    SessionProgress,
     rater_progress,
     session_progress,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.ratings import corrections_of, read_study_data, study_remarks
+from masrel.lab.ratings import Ratings, corrections_of, read_study_data, study_remarks
 from masrel.lab.report._design import size_sentence
 from masrel.lab.report._material import TARGETS, coefficient_name, lines_of, macros
 from masrel.lab.report._pages import TEMPLATES, as_markdown, converted
@@ -55,7 +56,29 @@ _CONDITIONS = {
 }
 
 
-def _gather_facts(paths: StudyPaths, protocol: Protocol) -> SimpleNamespace:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _StudyFacts:
+    """What the record of a study says."""
+
+    # None before there are ratings
+    ratings: Ratings | None
+    analysis: Analysis | None
+    sessions: tuple[SessionProgress, ...]
+    # of sessions that have begun: the days, UTC, and heads by the keys of `_CONDITIONS`
+    days: Sequence[date]
+    heads: Sequence[Mapping[str, str]]
+    days_between: Sequence[int]  # of a rater's session and the one before, sorted
+    n_corrections: int
+    remarks: tuple[str, ...]
+    raters: tuple[RaterProgress, ...]
+    frozen: Sequence[object]  # events which kept the plan, that of the first draw first
+    changes: Sequence[object]  # of the plan
+    n_schedules: int  # drawn
+    n_concealed: int  # of these, those drawn from a secret that is not published
+    files: Mapping[str, Sequence[Path]]  # by what they are, from the study's folder
+
+
+def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
     """Read everything of a study that a guideline asks for, for a template."""
     ratings = analysis = None
     tables = [f for f in (paths.ratings_file, paths.published_file) if f.is_file()]
@@ -85,17 +108,16 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> SimpleNamespace:
         "logs": [log for _, log, _, _ in begun],
         "ratings": tables[:1],
     }
-    return SimpleNamespace(
-        ratings=ratings,  # None, as the analysis is, before there are any
+    return _StudyFacts(
+        ratings=ratings,
         analysis=analysis,
         sessions=sessions,
-        # of sessions that have begun: the days, UTC, and what was the same
         days=[day for of_rater in days.values() for day in of_rater],
         heads=[
             {name: str(state.header.get(name)) for name in _CONDITIONS}
             for _, _, _, state in begun
         ],
-        days_between=sorted(  # of a rater's session and the one before
+        days_between=sorted(
             (after - before).days
             for of_rater in days.values()
             for before, after in pairwise(sorted(of_rater))
@@ -103,20 +125,18 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> SimpleNamespace:
         n_corrections=len(corrections_of(paths, protocol)),
         remarks=study_remarks(paths, protocol, include=()),
         raters=rater_progress(paths, protocol, sessions),
-        # events which kept the plan, that of the first draw first
         frozen=[event for _, event in plan_versions(paths)],
         changes=plan_changes(paths, protocol),
         n_schedules=len(drawn),
-        # of these, those drawn from a secret that is not published
         n_concealed=sum(s.commitment is not None for s in drawn) * (not is_published),
-        files={  # by what they are, from the study's folder
+        files={
             key: [file.relative_to(paths.root) for file in files]
             for key, files in named.items()
         },
     )
 
 
-def _words_of(facts: SimpleNamespace, protocol: Protocol) -> dict[str, object]:
+def _words_of(facts: _StudyFacts, protocol: Protocol) -> dict[str, object]:
     """Return what a template says facts with."""
     orders = "an order of their own, all orders equally likely"
     if protocol.schedule.scheme != "random-order":
@@ -311,7 +331,7 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
 
 
 def _filled(
-    facts: SimpleNamespace, number: str, item: _Item, say: Callable[[str], list[str]]
+    facts: _StudyFacts, number: str, item: _Item, say: Callable[[str], list[str]]
 ) -> _Item:
     to_add, names = item.to_add, item.facts
     if "ratings" in item.sources and facts.ratings is None:
@@ -331,7 +351,7 @@ def _filled(
     )
 
 
-def _notes(facts: SimpleNamespace) -> tuple[str, ...]:
+def _notes(facts: _StudyFacts) -> tuple[str, ...]:
     if facts.ratings is None:
         return ("No session has begun: what follows is the plan.",)
     counts = facts.ratings.simulated_counts

@@ -154,17 +154,15 @@ def _comparable(protocol: Protocol, raters: set[str]) -> dict[str, Any]:
 
 def _check_secrets(studies: Sequence[StudyPaths]) -> None:
     commitments = [
-        *(
-            (file, read_schedule(file).commitment)
-            for study in studies
-            for file in sorted(study.schedules.glob("*.csv"))
-            if not file.name.endswith("_sheet.csv")
-        ),
-        *(
-            (study.secret_file, secret.commitment)
-            for study in studies
-            if (secret := find_secret(study)) is not None
-        ),
+        (file, read_schedule(file).commitment)
+        for study in studies
+        for file in sorted(study.schedules.glob("*.csv"))
+        if not file.name.endswith("_sheet.csv")
+    ]
+    commitments += [
+        (study.secret_file, secret.commitment)
+        for study in studies
+        if (secret := find_secret(study)) is not None
     ]
     for place, commitment in commitments:
         first, needed = commitments[0]
@@ -250,7 +248,8 @@ def _files(
             for file in of_study
             if file not in others
         ]
-    copied += (*_rehearsals(studies), *((name, log) for log, name in names.items()))
+    copied += _rehearsals(studies)
+    copied += [(name, log) for log, name in names.items()]
     files: dict[str, Path] = {}
     for name, file in copied:
         other = files.setdefault(name, file)

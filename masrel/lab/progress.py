@@ -549,8 +549,9 @@ def _to_make(
     for verb, file in (("ratings", study.ratings_file), ("report", manifest)):
         made = file.stat().st_mtime_ns if file.exists() else -1
         if made < newest:
-            state = "not there yet" if made < 0 else "older than the logs"
-            return _step(study, verb, f"{done}; {file.name} is {state}")
+            why = f"{done}; {file.name} is "
+            why += "not there yet" if made < 0 else "older than the logs"
+            return _step(study, verb, why)
     return _step(study, "verify", f"{done}, and the report is written")
 
 

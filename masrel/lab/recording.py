@@ -422,7 +422,8 @@ def read_recording(path: Path) -> Recording:
     version = facts.pop("format", 1)
     check_format(facts_path, version, newest=_FORMAT, error=RecordingError)
     data = read_regular(path, most=MAX_RECORDING)
-    if facts.pop("sha256") != hashlib.sha256(data).hexdigest():
+    checksum = hashlib.sha256(data).hexdigest()
+    if facts.pop("sha256") != checksum:
         raise RecordingError(
             f"{path}: is not the file whose checksum {facts_path} holds"
         )

@@ -381,7 +381,8 @@ def _compute(
     # The seed is the purpose's own, derived from the study's: a line more in a plan
     # moves no other line's numbers. It fits a signed integer of 64 bits, as other
     # readers of the JSON have them.
-    digest = hashlib.sha256(f"{protocol.analysis.seed}/{purpose}".encode()).digest()
+    root = f"{protocol.analysis.seed}/{purpose}"
+    digest = hashlib.sha256(root.encode()).digest()
     return intervals.estimate(
         line.coefficient,
         ratings,

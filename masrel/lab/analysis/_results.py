@@ -466,7 +466,8 @@ def write_analysis(
 def analysis_text(analysis: Analysis) -> str:
     """Return an analysis as its file has it."""
     document = as_analysis_document(analysis)
-    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    return text + "\n"
 
 
 def to_frame(results: "Iterable[Estimate] | Mapping[str, Estimate]") -> "DataFrame":

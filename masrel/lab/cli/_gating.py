@@ -137,13 +137,11 @@ def _job_summary(analysis: "Analysis", gates: "Sequence[GateResult]") -> str:
         for planned in analysis.estimates
     ]
     if gates:
+        lines += ["", "| gate | |", "|---|---|"]
         lines += [
-            *("", "| gate | |", "|---|---|"),
-            *(
-                f"| {'holds' if result.holds else '**fails**'} | "
-                f"{as_markdown(str(result))} |"
-                for result in gates
-            ),
+            f"| {'holds' if result.holds else '**fails**'} | "
+            f"{as_markdown(str(result))} |"
+            for result in gates
         ]
     return "\n".join([*lines, ""]) + "\n"
 

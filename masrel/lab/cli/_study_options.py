@@ -98,7 +98,8 @@ def echo_stamp(file: Path, service: str | None) -> None:
     from masrel.lab.verification import request_stamp
 
     if service is not None:
-        click.echo(f"{file} is stamped: {request_stamp(file, service).isoformat()}")
+        time = request_stamp(file, service)
+        click.echo(f"{file} is stamped: {time.isoformat()}")
 
 
 ratings_option = click.option(
@@ -147,7 +148,8 @@ def warnings_as_notes() -> Iterator[None]:
             letters = {of for each in ours for of in getattr(each, "letters", ())}
             others = [of for of in ours if not isinstance(of, MissingLettersWarning)]
             others += [MissingLettersWarning(letters)] * bool(letters)
-            echo_notes(tuple(dict.fromkeys(f"note: {message}" for message in others)))
+            notes = dict.fromkeys(f"note: {message}" for message in others)
+            echo_notes(tuple(notes))
     for warning in caught:
         if not _is_ours(warning):
             warnings.warn_explicit(

@@ -88,10 +88,8 @@ def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> N
     felt = felt_sentences(material)
     if felt:
         click.echo(textwrap.fill(felt, 88) + "\n", err=csv)
-    contents: list[Content] = [
-        *(table for _, table in estimate_tables(material)),
-        *judge_tables(material),
-    ]
+    contents: list[Content] = [table for _, table in estimate_tables(material)]
+    contents += judge_tables(material)
     for name in ("intended", "in-person", "questionnaires"):
         _, section, reason = made_section(name, material)
         if reason not in ("", lacking(None).text):

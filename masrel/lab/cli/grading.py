@@ -12,10 +12,10 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
-from masrel.tables._tables import Column, Table, interval_text, number
 
 if TYPE_CHECKING:
     from masrel.lab.analysis import Effect, GradeRegression
+    from masrel.tables._tables import Table
 
 
 @click.command("grading")
@@ -75,7 +75,9 @@ def grading(
     )
 
 
-def _table(regression: "GradeRegression") -> Table:
+def _table(regression: "GradeRegression") -> "Table":
+    from masrel.tables._tables import Column, Table
+
     return Table(
         name="grading",
         caption="Odds of a higher grade, per standard deviation",
@@ -97,12 +99,18 @@ def _table(regression: "GradeRegression") -> Table:
 
 
 def _row(effect: "Effect") -> tuple[str, str, float, str]:
-    from masrel.lab.analysis._grading import PREDICTORS
+    from masrel.tables._tables import interval_text, number
 
-    unit = PREDICTORS[effect.predictor][1]
     return (
         effect.predictor,
-        number(effect.per, 3) + f" {unit}" * (unit != "1"),
+        f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
         effect.odds_ratio,
         interval_text(effect.low, effect.high, 2),
     )
+
+
+def _unit(predictor: str) -> str:
+    from masrel.lab.analysis._grading import PREDICTORS
+
+    unit = PREDICTORS[predictor][1]
+    return "" if unit == "1" else unit

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -26,22 +26,11 @@ from masrel.cli._options import (
 from masrel.cli._paths import InputFile, note_inputs, refuse_inputs
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
-from masrel.lab.elbow import (
-    STANDARD_MODELS,
-    ElbowParameters,
-    JointModel,
-    intermediate_models,
-)
-from masrel.lab.elbow._model_file import MODEL_KEYS, QUANTITIES, as_toml, model_document
-from masrel.lab.protocol import StudyPaths, joint_model, read_model_file, read_protocol
-from masrel.lab.protocol._kinds import (
-    DEFAULT_KIND,
-    kind_problem,
-    model_of_kind,
-    value_problems,
-)
-from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
-from masrel.tables._tables import Column, Table
+
+if TYPE_CHECKING:
+    from masrel.lab.elbow import ElbowParameters, JointModel
+    from masrel.tables._tables import Table
+
 
 _COMMANDS = {
     "trace": "Compute phases, peak torque and samples of stretches of models.",
@@ -82,8 +71,10 @@ class JointOptions:
     rise: float | None  # how long torque takes to its peak, s
     inertia: float | None  # m of (1) and (5), kg·m²
 
-    def changed(self, joint: JointModel) -> JointModel:
+    def changed(self, joint: "JointModel") -> "JointModel":
         """Return a joint with the changes, which only a spastic elbow can have."""
+        from masrel.lab.elbow import ElbowParameters
+
         options = {
             "rest_angle": None if self.rest is None else math.radians(self.rest),
             "post_catch": self.post_catch,
@@ -166,6 +157,8 @@ def tardieu(
     output: OutputOptions,
 ) -> None:
     """Compute R2, R1 and their difference from full-range stretches at three speeds."""
+    from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
+
     documents = [
         tardieu_document(name, joint, start, speeds)
         for name, joint in joints_of(joints).items()
@@ -179,8 +172,10 @@ def tardieu(
     )
 
 
-def joints_of(names: JointOptions) -> dict[str, JointModel]:
+def joints_of(names: JointOptions) -> dict[str, "JointModel"]:
     """Return joints by name."""
+    from masrel.lab.protocol import StudyPaths, joint_model, read_protocol
+
     if not names.models and not names.kinds:
         raise click.UsageError("Missing option '--model' or '--kind'.")
     if names.parameters and len(names.kinds) != 1:
@@ -214,8 +209,10 @@ def _names(option: str, models: Sequence[str]) -> list[str]:
     return names
 
 
-def _read_joint(option: str, model: str, more: str = "") -> ElbowParameters:
+def _read_joint(option: str, model: str, more: str = "") -> "ElbowParameters":
     # a standard model, or that of a file
+    from masrel.lab.elbow import STANDARD_MODELS
+    from masrel.lab.protocol import read_model_file
 
     if model.endswith(".toml"):
         note_inputs(Path(model))
@@ -228,8 +225,14 @@ def _read_joint(option: str, model: str, more: str = "") -> ElbowParameters:
     return STANDARD_MODELS[model]
 
 
-def _joint_of_kind(kind: str, settings: Sequence[str]) -> JointModel:
+def _joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
     # settings: KEY=VALUE each
+    from masrel.lab.protocol._kinds import (
+        DEFAULT_KIND,
+        kind_problem,
+        model_of_kind,
+        value_problems,
+    )
 
     refuse(
         ((problem := kind_problem(kind)) is not None, f"--kind: {problem}"),
@@ -323,6 +326,8 @@ def between(
 
 def _rows(models: Sequence[str], n_models: int) -> list[dict[str, Any]]:
     # for every new model its name, its neighbours, and the content of its file
+    from masrel.lab.elbow import intermediate_models
+    from masrel.lab.elbow._model_file import model_document
 
     names, rows = _names("MODEL", models), []
     joints = [_read_joint("MODEL", model) for model in models]
@@ -362,6 +367,8 @@ def _source(name: str, model: str) -> tuple[str, bool]:
 
 
 def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None:
+    from masrel.lab.elbow._model_file import as_toml
+
     files = [folder / f"{row['name']}.toml" for row in rows]
     refuse_inputs(*files)
     there = [path.name for path in files if path.exists()]
@@ -372,12 +379,16 @@ def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None
             "what is there"
         )
     for path, row in zip(files, rows, strict=True):
-        write_file(path, as_toml({key: row[key] for key in row if key not in _PLACES}))
+        document = {key: row[key] for key in row if key not in _PLACES}
+        write_file(path, as_toml(document))
         row["file"] = str(path)
     click.echo(f"models: {folder}, {files[0].name} to {files[-1].name}", err=True)
 
 
-def _table(rows: list[dict[str, Any]]) -> Table:
+def _table(rows: list[dict[str, Any]]) -> "Table":
+    from masrel.lab.elbow._model_file import MODEL_KEYS, QUANTITIES
+    from masrel.tables._tables import Column, Table
+
     quantities = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]
     return Table(
         name="between",

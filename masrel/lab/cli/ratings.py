@@ -53,11 +53,9 @@ def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
     )
     if protocol.questionnaires:
         answers = answers_from_logs(paths, protocol)
-        beside = (
-            output.with_name(f"{output.stem}_answers.csv")
-            if output
-            else paths.answers_file
-        )
+        beside = paths.answers_file
+        if output is not None:
+            beside = output.with_name(f"{output.stem}_answers.csv")
         write_answers(answers, beside, within=None if output else paths.root)
         n_open = sum(each.answer is None for each in answers)
         click.echo(f"{len(answers) - n_open} answers, {n_open} missing: {beside}")

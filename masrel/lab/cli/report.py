@@ -262,7 +262,8 @@ def report(
     if check:
         document["check"] = changes
     if old is not None:
-        document |= comparing.compare(old, parse_json(numbers), shows=not prints_json)
+        new = parse_json(numbers)
+        document |= comparing.compare(old, new, shows=not prints_json)
     if output.json_file is not None:
         write_json(document, output.json_file)
     conclude(verdict, gating)

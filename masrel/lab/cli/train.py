@@ -17,9 +17,9 @@ from masrel.lab.cli._study_options import (
     of_study,
     warnings_as_notes,
 )
-from masrel.lab.protocol import Protocol, StudyPaths
 
 if TYPE_CHECKING:
+    from masrel.lab.protocol import Protocol, StudyPaths
     from masrel.lab.training import Lesson
 
 _WIDTH = 88  # of notes below a table
@@ -40,8 +40,8 @@ def train() -> None:
 @clock_option
 @output_options(quiet="Do not print the closing line.")
 def _train(
-    paths: StudyPaths,
-    protocol: Protocol,
+    paths: "StudyPaths",
+    protocol: "Protocol",
     rater: str,
     grades: Literal["console", "simulated"],
     clock: Literal["real", "simulated"] | None,
@@ -96,8 +96,8 @@ def _show_grade(lesson: "Lesson") -> None:
     csv="Print the learning curve as CSV with all digits.",
 )
 def _show(
-    paths: StudyPaths,
-    protocol: Protocol,
+    paths: "StudyPaths",
+    protocol: "Protocol",
     rater: str,
     level: float,
     page: Path | None,
@@ -126,4 +126,5 @@ def _show(
         mode=0o600,
     )
     if page is not None:
-        write_file(page, training_page(record, protocol, level=level), mode=0o600)
+        text = training_page(record, protocol, level=level)
+        write_file(page, text, mode=0o600)

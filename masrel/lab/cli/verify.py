@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from operator import attrgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -20,18 +21,9 @@ from masrel.errors import ParameterError
 from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import echo_stamp, stamp_option, warnings_as_notes
 from masrel.lab.protocol import StudyPaths
-from masrel.lab.verification import (
-    Anchor,
-    Finding,
-    SessionRecord,
-    Verification,
-    anchor_findings,
-    anchors_of,
-    read_anchors,
-    read_stamp,
-    verify_study,
-    write_anchors,
-)
+
+if TYPE_CHECKING:
+    from masrel.lab.verification import Anchor, Finding, SessionRecord, Verification
 
 
 @click.command("verify")
@@ -74,6 +66,8 @@ def verify(
     that makes it again is named; the exit code is 1 if nothing is broken. Doubt: there
     may be an innocent reason; the exit code is 0, as without findings.
     """
+    from masrel.lab.verification import anchors_of, verify_study
+
     if not study.is_dir():
         raise ParameterError(f"{study}: needed the folder of a study, got none")
     paths = StudyPaths(study)
@@ -93,8 +87,10 @@ def verify(
 
 
 def _anchored(
-    study: StudyPaths, file: Path | None, anchors: tuple[Anchor, ...]
-) -> Iterable[Finding]:
+    study: StudyPaths, file: Path | None, anchors: "tuple[Anchor, ...]"
+) -> "Iterable[Finding]":
+    from masrel.lab.verification import anchor_findings, read_anchors, write_anchors
+
     if file is None:
         return ()
     if file.resolve().is_relative_to(study.root.resolve()):
@@ -125,6 +121,8 @@ def _anchored(
 
 
 def _say_stamp(file: Path, service: str | None, authority: Path | None) -> None:
+    from masrel.lab.verification import read_stamp
+
     echo_stamp(file, service)
     if service is None and (time := read_stamp(file, authority)) is not None:
         by = "" if authority is None else f" by {authority}"
@@ -132,7 +130,7 @@ def _say_stamp(file: Path, service: str | None, authority: Path | None) -> None:
 
 
 def _document(
-    verification: Verification, anchors: tuple[Anchor, ...]
+    verification: "Verification", anchors: "tuple[Anchor, ...]"
 ) -> dict[str, object]:
     document = {
         "is_whole": verification.is_whole,
@@ -143,7 +141,7 @@ def _document(
     return {**document, "anchors": [dataclasses.asdict(anchor) for anchor in anchors]}
 
 
-def _line_of(record: SessionRecord, *, is_training: bool) -> str:
+def _line_of(record: "SessionRecord", *, is_training: bool) -> str:
     # how far a session, a rehearsal or a training came, which has no schedule
     which = f"{record.session} {record.rater}"
     if record.rehearsal is not None:
@@ -163,8 +161,8 @@ def _line_of(record: SessionRecord, *, is_training: bool) -> str:
 
 def _show(
     study: Path,
-    verification: Verification,
-    anchors: tuple[Anchor, ...],
+    verification: "Verification",
+    anchors: "tuple[Anchor, ...]",
     n: Mapping[str, int],
 ) -> None:
     for record in (*verification.sessions, *verification.rehearsals):

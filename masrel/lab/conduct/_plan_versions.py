@@ -72,11 +72,9 @@ class PlanChange:
 
     def __str__(self) -> str:
         was, is_ = self.before or "not planned", self.after or "gone"
-        when = (
-            f"recorded on {self.time_utc[:10]}"
-            if self.time_utc
-            else "nobody has recorded it"
-        )
+        when = "nobody has recorded it"
+        if self.time_utc is not None:
+            when = f"recorded on {self.time_utc[:10]}"
         return f"Change of the plan: {self.key} was {was}, then {is_}; {when}"
 
 
@@ -161,12 +159,7 @@ def is_of_earlier(
     """
     logs = map(timed_events, [*study.conduct_logs(), *study.logs()])
     timed = sorted(chain(*logs), key=itemgetter(0))
-    less = [
-        n
-        for n, (*_, event) in enumerate(timed, 1)
-        if event.kind in _TAKE_BACK
-        or (event.kind == "correction" and event.fields.get("grade") is None)
-    ]
+    less = [n for n, (*_, event) in enumerate(timed, 1) if _takes_back(event)]
 
     def made(then: Protocol, n_events: int) -> tuple[object, int]:
         lines = _lines_after(timed, n_events, study, protocol)
@@ -190,6 +183,11 @@ def is_of_earlier(
         for then in ({protocol_hash(protocol): protocol} | versions).values()
         for stretch in pairwise([0, *less, len(timed) + 1])
     )
+
+
+def _takes_back(event: Event) -> bool:
+    is_correction = event.kind == "correction" and event.fields.get("grade") is None
+    return is_correction or event.kind in _TAKE_BACK
 
 
 def _lines_after(

@@ -32,13 +32,24 @@ from masrel.lab.schedule import Presentation, Schedule
 from masrel.lab.schedule.presentation import _read_drawn
 from masrel.lab.schedule.sheets import _open_schedule
 
-# What may be said of a note, and of an adverse event alone: its seriousness as ICH E2A
-# means it, and how likely it is that the study caused it
+NoteKind = Literal["note", "adverse-event", "deviation"]
+"""What a note is of."""
+
+Severity = Literal["mild", "moderate", "severe"]
+"""How severe an adverse event is."""
+
+Seriousness = Literal["serious", "not serious"]
+"""Whether an adverse event is serious, as ICH E2A means it."""
+
+Relatedness = Literal["unrelated", "unlikely", "possible", "probable", "definite"]
+"""How likely it is that the study caused an adverse event."""
+
+# What may be said of a note, and of an adverse event alone
 _CHOICES = {
-    "kind": ("note", "adverse-event", "deviation"),
-    "severity": ("mild", "moderate", "severe"),
-    "seriousness": ("serious", "not serious"),
-    "relatedness": ("unrelated", "unlikely", "possible", "probable", "definite"),
+    "kind": get_args(NoteKind),
+    "severity": get_args(Severity),
+    "seriousness": get_args(Seriousness),
+    "relatedness": get_args(Relatedness),
 }
 _ADVERSE = ("severity", "seriousness", "relatedness", "onset", "action", "outcome")
 
@@ -73,13 +84,13 @@ class Note:
 
     text: str
     who: str
-    kind: str = "note"
+    kind: NoteKind = "note"
     rater: str | None = None
     session: str | None = None
     on: str | None = None
-    severity: str | None = None
-    seriousness: str | None = None
-    relatedness: str | None = None
+    severity: Severity | None = None
+    seriousness: Seriousness | None = None
+    relatedness: Relatedness | None = None
     onset: str | None = None
     action: str | None = None
     outcome: str | None = None
@@ -280,11 +291,9 @@ def record_new_rater(
         for name, text in values.items()
         if text.strip()
     }
-    entry: dict[str, object] = {
-        "id": rater,
-        **({} if site is None else {"site": site}),
-        **({"fields": known} if known else {}),
-    }
+    entry: dict[str, object] = {"id": rater}
+    entry |= {} if site is None else {"site": site}
+    entry |= {"fields": known} if known else {}
     fields = {"rater": rater, "site": site, **stated(who=who)}
     with open_conduct(study, protocol, now=now) as log:  # nobody else adds meanwhile
         for event in log.events:

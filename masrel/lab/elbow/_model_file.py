@@ -127,7 +127,8 @@ def model_document(
     constants: Document = {
         key: getattr(joint, name) * factor
         for key, (name, factor) in CONSTANT_KEYS.items()
-    } | {key: getattr(joint, key) for key in READING_KEYS}
+    }
+    constants |= {key: getattr(joint, key) for key in READING_KEYS}
     defaults = {field.name: field.default for field in fields(joint)}
     constants |= {
         key: value * factor

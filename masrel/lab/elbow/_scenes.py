@@ -365,10 +365,11 @@ def _columns_of(items: Any, kind: type, rows: _Rows) -> dict[str, Any]:
     # fields by name, each a column or one value for all
     which = rows if len(items) > 1 else np.zeros(1, dtype=np.intp)
     if isinstance(items, Columns):
-        return _DEFAULTS[kind] | {
+        fields_of = {
             name: column[which] if isinstance(column, np.ndarray) else column
             for name, column in items.columns.items()
         }
+        return _DEFAULTS[kind] | fields_of
     chosen = [items[i] for i in which.tolist()]
     columns: dict[str, Any] = {}
     for name in _FIELDS[kind]:

@@ -527,15 +527,14 @@ def trace(parameters: JointModel, motion: Motion, *, rate_hz: float = 1000.0) ->
     """
     if not 0.0 < rate_hz < math.inf:
         raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
-    end = (
-        Timeline(parameters, motion).end
-        if isinstance(parameters, ElbowParameters)
-        else motion.duration
-    )
+    end = motion.duration
+    if isinstance(parameters, ElbowParameters):
+        end = Timeline(parameters, motion).end
     time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
     angle, velocity = motion.angle(time), motion.velocity(time)
     torque, phase = _stepped(parameters, motion.start, time, angle, velocity)
-    for column in (time, angle, velocity, torque, phase):
+    columns = (time, angle, velocity, torque, phase)
+    for column in columns:
         column.setflags(write=False)
     return Trace(
         time=time,
@@ -629,7 +628,8 @@ def outline(
         at = np.linspace(low, high, n)
         times.append(at)
         torques.append(_segment_torque(segment, _moved(motion, at)))
-        codes.append(np.full(n, marks[bisect_right(begun, low) - 1][0], dtype=np.int8))
+        code = marks[bisect_right(begun, low) - 1][0]
+        codes.append(np.full(n, code, dtype=np.int8))
     time = np.concatenate(times)
     return Outline(
         time=time,

@@ -703,7 +703,8 @@ def interrupted(motion: Motion, *, at: float, pause: float) -> Joined:
     """
     first = Part(motion=motion, begin=0.0, finish=at)
     rest = Hold(start=first.end, duration=pause)
-    return Joined([first, rest, Part(motion=motion, begin=at, finish=motion.duration)])
+    last = Part(motion=motion, begin=at, finish=motion.duration)
+    return Joined([first, rest, last])
 
 
 @dataclass(frozen=True, slots=True)

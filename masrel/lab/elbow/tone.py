@@ -219,7 +219,8 @@ class LeadPipe(ToneModel):
         bent, limit = np.zeros(times.size), self.bristle_travel
         for part, before in self._bends(motion):
             mine = times >= part.start
-            travel = part.angle_at(np.minimum(times[mine], part.end)) - part.angle[0]
+            until = np.minimum(times[mine], part.end)
+            travel = part.angle_at(until) - part.angle[0]
             bent[mine] = np.clip(before + travel, -limit, limit)
         return [bent]
 
@@ -478,7 +479,8 @@ class ClaspKnife(ToneModel):
 
     def _beyond(self, part: OneWay, angle: float) -> Polynomial:
         # how far θ + μ·max(ω, 0) is beyond an angle
-        return part.beyond(angle, self.threshold_slope if part.direction > 0 else 0.0)
+        lead = self.threshold_slope if part.direction > 0 else 0.0
+        return part.beyond(angle, lead)
 
     def _latched(self, motion: Motion) -> list[tuple[float, float]]:
         # when the latch closes and opens, s; the last may never open
@@ -573,7 +575,8 @@ class Contracture(ToneModel):
 
         Its range of motion ends 10 degrees beyond the end that is felt.
         """
-        end = _FULL_RANGE - math.radians(grade_of(_SHORTENED_DEG, severity, "severity"))
+        shorter = math.radians(grade_of(_SHORTENED_DEG, severity, "severity"))
+        end = _FULL_RANGE - shorter
         return cls(end_angle=end, range_end=end + _BEYOND)
 
     @property
@@ -592,10 +595,10 @@ class Contracture(ToneModel):
     def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: those at `range_end`."""
         beyond = min(self.range_end, self.cap_angle) - self.end_angle
-        steep = (
-            self.end_torque * self.end_steepness * math.exp(self.end_steepness * beyond)
-        )
-        return self.stiffness + steep, self.damping
+        steep = self.end_torque * self.end_steepness
+        return self.stiffness + steep * math.exp(
+            self.end_steepness * beyond
+        ), self.damping
 
     def _law(self, angle: Number, velocity: Number, rest: float, *_: Number) -> Number:
         cap = self.cap_angle
@@ -697,7 +700,8 @@ class Dystonia(ToneModel):
         if math.isnan(kept.begun):
             kept.begun = time_s
         # once released it stays at its resting activation
-        activation = self._activation(0.0 if joint.is_given_up else time_s - kept.begun)
+        since = 0.0 if joint.is_given_up else time_s - kept.begun
+        activation = self._activation(since)
         joint.phase = int(activation > self.resting_activation)
         return (activation,)
 

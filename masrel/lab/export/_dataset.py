@@ -256,7 +256,8 @@ def _raters_table(
     rows = _records(raters_csv(paths, protocol))
     # of ratings that were published nobody knows how they came about
     known = [*_OF_RATERS] if paths.logs() else ["rater", "site"]
-    described = {name: _OF_RATERS[name] for name in known} | {
+    described = {name: _OF_RATERS[name] for name in known}
+    described |= {
         name: column(field.title or name, field.unit, field.choices)
         for name, field in protocol.rater_fields.items()
         if name not in hidden

@@ -267,10 +267,8 @@ def _contents(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
     yield "ratings/ratings.csv", dataset.ratings.as_csv()
     if dataset.answers is not None:
         yield "ratings/answers.csv", dataset.answers.as_csv()
-    made = [
-        *sorted(dataset.paths.schedules.glob("*.csv")),
-        *(dataset.paths.analysis_file, *dataset.report),
-    ]
+    made = [*sorted(dataset.paths.schedules.glob("*.csv"))]
+    made += [dataset.paths.analysis_file, *dataset.report]
     for _, _, recording in dataset.recordings:
         made += [recording, recording.with_suffix(".json")]
     for path in made:

@@ -97,11 +97,12 @@ def _places(
 ) -> list[tuple[str, str]]:
     # rater and session of each sheet
     site_of = {rater.id: rater.site for rater in protocol.raters}
-    for name, (chosen, ids) in {
+    known = {
         "rater": (raters, list(site_of)),
         "session": (sessions, [session.id for session in protocol.sessions]),
         "site": (sites, sorted({site for site in site_of.values() if site})),
-    }.items():
+    }
+    for name, (chosen, ids) in known.items():
         for each in chosen:
             if each not in ids:
                 raise ParameterError(

@@ -40,7 +40,8 @@ def _key_problems(
 ) -> Iterator[str]:
     for place, key in enumerate(key for key in raw if key not in fields):
         # what was meant takes long to find, and helps with the first few
-        yield _unknown(f"{prefix}{key}", key, fields if place < _MAX_HINTS else {})
+        known = fields if place < _MAX_HINTS else {}
+        yield _unknown(f"{prefix}{key}", key, known)
     for key, (annotation, is_required) in fields.items():
         where = f"{prefix}{key}"
         if key in raw:

@@ -113,14 +113,15 @@ def _is_padded(text: str) -> bool:
 
 def _ids(protocol: Protocol) -> Iterator[str]:
     # ids that no file system takes for one: to some, R1 and r1 are the same name
-    for key, names in {
+    ids = {
         "models": [model.id for model in protocol.models],
         "raters": [rater.id for rater in protocol.raters],
         "sessions": [session.id for session in protocol.sessions],
         "questionnaires": [each.id for each in protocol.questionnaires],
         "analysis.estimates": [line.id for line in protocol.analysis.estimates],
         "analysis.judges": [line.id for line in protocol.analysis.judges],
-    }.items():
+    }
+    for key, names in ids.items():
         first: dict[str, int] = {}
         for index, name in enumerate(names):
             earlier = first.setdefault(name.casefold(), index)
@@ -274,7 +275,8 @@ def _too_strict(protocol: Protocol) -> Iterator[str]:
     # limits that no order of these models keeps
     rules, models = protocol.schedule, protocol.models
     n_all = len(models) * rules.repeats
-    n_standards = Counter(model.role for model in models)["standard"] * rules.repeats
+    roles = Counter(model.role for model in models)
+    n_standards = roles["standard"] * rules.repeats
     if rules.standards_apart and n_standards > n_all - n_standards + 1:
         yield (
             "schedule.standards_apart: needed an order without two standards in a row, "

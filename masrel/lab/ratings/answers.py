@@ -164,14 +164,15 @@ def _of_session(
 ) -> Iterator[GivenAnswer]:
     schedule = read_schedule(study.schedule_file(rater, session))
     about = [(p.code, p.model, p.repeat) for p in schedule.presentations]
-    for (questionnaire, question), (code, model, repeat) in (
+    asked_of = (
         *(
             (each, place)
             for place in about
             for each in questions_of(protocol, "presentation")
         ),
         *((each, (None, None, None)) for each in questions_of(protocol, "session")),
-    ):
+    )
+    for (questionnaire, question), (code, model, repeat) in asked_of:
         key = questionnaire.id, question.id, code
         yield GivenAnswer(
             session=session,
@@ -200,10 +201,8 @@ def answers_csv(answers: tuple[GivenAnswer, ...]) -> str:
     """
     of_persons = (*FROM_PERSONS, RECONSTRUCTED)
     is_simulated = any(each.grades_from not in of_persons for each in answers)
-    head = [
-        *["SIMULATED: not answers of persons."] * is_simulated,
-        "Answers to questionnaires, one row a question; empty is missing.",
-    ]
+    head = ["SIMULATED: not answers of persons."] * is_simulated
+    head += ["Answers to questionnaires, one row a question; empty is missing."]
     rows = ((getattr(each, name) for name in _COLUMNS) for each in answers)
     return table_csv(_COLUMNS, rows, head=[*head, f"format: {_FORMAT}"], absent="")
 

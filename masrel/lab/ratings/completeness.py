@@ -228,12 +228,7 @@ def _of_sessions(
                 "so), or move the log out of the study."
             )
         elif log.stat().st_size:
-            yield from (
-                f"{_name(study, log)}: the session was held on {event.fields['on']}, "
-                f"as was corrected on {event.time_utc[:10]}{_by_whom(event, include)}."
-                for event in _read(log)[0]
-                if event.kind == "day-correction"
-            )
+            yield from _of_days(study, log, include)
             yield from _of_skips(study, log, include)
             yield from _of_second_entries(study, log, of_study)
         else:
@@ -247,6 +242,15 @@ def _of_sessions(
                 f"{_name(study, folder)} has recordings and there is no log of them: "
                 "their grades are not among the ratings. Put a copy of the log back."
             )
+
+
+def _of_days(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:
+    return (
+        f"{_name(study, log)}: the session was held on {event.fields['on']}, as was "
+        f"corrected on {event.time_utc[:10]}{_by_whom(event, include)}."
+        for event in _read(log)[0]
+        if event.kind == "day-correction"
+    )
 
 
 def _of_skips(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:
@@ -275,10 +279,9 @@ def _of_second_entries(
     of_rater = of_study.get(str(state.header.get("rater")), {})
     for each in sheet_differences(state, of_rater):
         code = "" if each.code is None else f" code {each.code},"
-        # an answer is its rater's
-        values = f": the first has {each.first}, the second {each.second}" * (
-            each.column == "grade"
-        )
+        values = ""
+        if each.column == "grade":  # an answer is its rater's
+            values = f": the first has {each.first}, the second {each.second}"
         yield (
             f"{_name(study, log)}: the two entries of its sheet differ,{code} "
             f"{each.column}{values} ({each.file}, row {each.row}). The first counts "

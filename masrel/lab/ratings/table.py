@@ -569,7 +569,8 @@ def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    mode = 0o600 if any(row.code is not None for row in ratings.rows) else None
+    names_models = any(row.code is not None for row in ratings.rows)
+    mode = 0o600 if names_models else None
     write_file(path, ratings_csv(ratings), within=within, mode=mode)
 
 
@@ -605,8 +606,7 @@ def _texts(ratings: Ratings) -> Iterator[str]:
 
 
 def _text(ratings: Ratings, names: Sequence[str], *more: str) -> str:
-    head = [
-        *["SIMULATED: not grades of persons on hardware."] * ratings.simulated,
-        *("Ratings, one row a rating; grades are text; NA is missing.", *more),
-    ]
-    return table_csv(names, (row[: len(names)] for row in ratings.rows), head=head)
+    head = ["SIMULATED: not grades of persons on hardware."] * ratings.simulated
+    head += ["Ratings, one row a rating; grades are text; NA is missing.", *more]
+    rows = (row[: len(names)] for row in ratings.rows)
+    return table_csv(names, rows, head=head)

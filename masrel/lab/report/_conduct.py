@@ -287,10 +287,8 @@ def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Tabl
                 (field_heading(name, field), text, n) for text, n in tally.items()
             ]
     if numbers:
-        measures = {
-            **{"mean": "Mean", "sd": "SD", "median": "Median"},
-            **{"least": "Min", "most": "Max"},
-        }
+        measures = {"mean": "Mean", "sd": "SD", "median": "Median"}
+        measures |= {"least": "Min", "most": "Max"}
         yield Table(
             name="rater_numbers",
             caption="What is known of the raters who are analysed: numbers",
@@ -392,10 +390,8 @@ def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
 
 
 def _changes_table(material: Material, conduct: StudyConduct) -> Table:
-    names = {
-        **{"key": "Of the plan", "before": "Before", "after": "After"},
-        "recorded": "Recorded",
-    }
+    names = {"key": "Of the plan", "before": "Before", "after": "After"}
+    names["recorded"] = "Recorded"
     return table_of(
         "plan_changes",
         "Changes to the plan since the first draw of schedules",

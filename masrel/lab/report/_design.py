@@ -11,7 +11,6 @@ from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
 from masrel.lab.report._material import (
     MANY_RATERS,
-    MODEL,
     Material,
     estimate_titles,
     lacking,
@@ -72,6 +71,8 @@ _CONSTANT_COLUMNS = (
     Column(key="value", heading="Value"),
 )
 
+_MODEL = Column(key="model", heading="Model", align="left")
+
 
 def design_section(material: Material) -> Iterator[Content]:
     """Describe the study: models with parameters, raters and sessions."""
@@ -117,7 +118,7 @@ def _models(material: Material) -> Table:
         name="models",
         caption="Haptic models and their parameters",
         columns=(
-            MODEL,
+            _MODEL,
             Column(key="role", heading="Role", align="left"),
             Column(key="intended_grade", heading="Intended grade", align="center"),
             *(
@@ -150,12 +151,12 @@ def _constants(material: Material) -> Iterator[Table]:
         for key, value in msgspec.structs.asdict(model.constants).items()
         if value not in (None, values[key])
     ]
-    has_others = any(model.kind != DEFAULT_KIND for model in protocol.models)
-    which = "spastic elbows" if has_others else "models"
+    caption = "Constants all models share"
+    if any(model.kind != DEFAULT_KIND for model in protocol.models):
+        caption = "Constants all spastic elbows share"
     yield Table(
         name="constants",
-        caption=f"Constants all {which} share"
-        + ", but for those in the table below" * bool(single),
+        caption=caption + ", but for those in the table below" * bool(single),
         columns=_CONSTANT_COLUMNS,
         rows=tuple(shared),
         data=material.data,
@@ -164,7 +165,7 @@ def _constants(material: Material) -> Iterator[Table]:
         yield Table(
             name="own_constants",
             caption="Constants that single models have of their own",
-            columns=(MODEL, *_CONSTANT_COLUMNS),
+            columns=(_MODEL, *_CONSTANT_COLUMNS),
             rows=tuple(single),
             data=material.data,
         )
@@ -186,7 +187,7 @@ def _other_kinds(material: Material) -> Iterator[Table]:
             name="other_kinds",
             caption="Models of other kinds than the spastic elbow",
             columns=(
-                MODEL,
+                _MODEL,
                 Column(key="kind", heading="Kind", align="left"),
                 Column(key="numbers", heading=heading, align="left"),
             ),

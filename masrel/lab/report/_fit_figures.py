@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from masrel.lab.elbow._model_file import QUANTITIES, Quantity
 from masrel.lab.elbow.identification import ElbowFit, FittedParameter, FrictionFit
 from masrel.lab.elbow.identification._catches import Catch
-from masrel.lab.elbow.identification._clusters import Floats
 from masrel.lab.report._fits import FRICTION
 from masrel.plots._style import BLACK, BLUE, GREY, ORANGE
 from masrel.tables._tables import interval_text, number
@@ -43,6 +42,8 @@ _OPEN: dict[str, Any] = {
     "markersize": 4.5,
     "fillstyle": "none",
 }
+
+_Floats = NDArray[np.float64]
 
 
 def _columns(
@@ -151,7 +152,7 @@ def _fast_trial(column: Sequence[Axes], fit: ElbowFit, place: int) -> None:
     top.set_title(f"mean speed {number(math.degrees(catch.mean_speed), 0)} deg/s")
 
 
-def _separated(pieces: Iterable[Floats]) -> Floats:
+def _separated(pieces: Iterable[_Floats]) -> _Floats:
     # drawn as lines that nothing joins
     return np.concatenate([np.append(piece, math.nan) for piece in pieces])
 
@@ -213,7 +214,8 @@ def _catch_angles(axes: Axes, fit: ElbowFit, catches: Sequence[Catch]) -> None:
     title = _fitted(fit, "catch_angle_constant", 1)
     if not math.isnan(fit["catch_angle_constant"].value + fit["catch_slope"].value):
         at = np.linspace(speeds.min() - 5.0, speeds.max() + 5.0, 400)
-        axes.plot(at, np.degrees(_catch_angle_law(fit, np.radians(at))), **_LAW)
+        law = np.degrees(_catch_angle_law(fit, np.radians(at)))
+        axes.plot(at, law, **_LAW)
         title += f"\n{_fitted(fit, 'catch_slope', 3)}"
     axes.set_title(title)
 
@@ -242,7 +244,7 @@ def _catch_travels(axes: Axes, fit: ElbowFit, catches: Sequence[Catch]) -> None:
 
 
 def _through_zero(
-    axes: Axes, x: Floats, y: Floats, fit: ElbowFit, name: str, per: float
+    axes: Axes, x: _Floats, y: _Floats, fit: ElbowFit, name: str, per: float
 ) -> None:
     # dots and a line through the origin; its slope is per π/`per` of the axis' unit
     axes.plot(x, y, **_DOT)
@@ -272,7 +274,8 @@ def residuals_figure(fit: ElbowFit) -> Figure:
             x[::every], y[::every], linestyle="none", marker=".", markersize=1.2,
             color=GREY, alpha=0.35, rasterized=True,
         )  # fmt: skip
-        axes.plot(*_binned_means(x, y), color=BLACK, linewidth=1.4)
+        middles = _binned_means(x, y)
+        axes.plot(*middles, color=BLACK, linewidth=1.4)
         reach = 1.05 * float(np.quantile(np.abs(y), 0.999))
         _left(axes, title, label, "measured − fitted (N·m)", reach)
         if label.startswith("time"):
@@ -293,7 +296,7 @@ def _left(axes: Axes, title: str, across: str, up: str, reach: float) -> None:
     axes.set(title=title, xlabel=across, ylabel=up, ylim=(-reach, reach))
 
 
-def _slow_residuals(fit: ElbowFit) -> tuple[Floats, Floats]:
+def _slow_residuals(fit: ElbowFit) -> tuple[_Floats, _Floats]:
     # angles (rad) of all slow samples, and measured - fitted torque
     return _joined(
         (trial.pre_catch.angle, trial.pre_catch.measured - law)
@@ -302,7 +305,7 @@ def _slow_residuals(fit: ElbowFit) -> tuple[Floats, Floats]:
     )
 
 
-def _fast_residuals(fit: ElbowFit) -> tuple[Floats, Floats]:
+def _fast_residuals(fit: ElbowFit) -> tuple[_Floats, _Floats]:
     # times since the catch of all fast samples, and measured - fitted torque
     return _joined(
         (
@@ -314,12 +317,12 @@ def _fast_residuals(fit: ElbowFit) -> tuple[Floats, Floats]:
     )
 
 
-def _joined(parts: Iterable[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+def _joined(parts: Iterable[tuple[_Floats, _Floats]]) -> tuple[_Floats, _Floats]:
     x, y = zip(*parts, strict=True)
     return np.concatenate(x), np.concatenate(y)
 
 
-def _binned_means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def _binned_means(x: _Floats, y: _Floats) -> tuple[_Floats, _Floats]:
     # middles of bins of x and the means of y in them, each (_BINS,)
     edges = np.linspace(x.min(), x.max(), _BINS + 1)
     bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _BINS - 1)
@@ -329,7 +332,7 @@ def _binned_means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return 0.5 * (edges[1:] + edges[:-1]), means  # a bin of too few has no mean
 
 
-def _catch_angle_law(fit: ElbowFit, mean_speed: Floats) -> Floats:
+def _catch_angle_law(fit: ElbowFit, mean_speed: _Floats) -> _Floats:
     # the fitted catch angles (rad) of mean speeds (rad/s)
     constant, slope = fit["catch_angle_constant"].value, fit["catch_slope"].value
     constants = fit.constants

@@ -17,7 +17,6 @@ from masrel.lab.analysis._descriptions import FEWEST_RATERS
 from masrel.lab.report._material import (
     INTERVAL,
     MANY_RATERS,
-    MODEL,
     SUPPLEMENT,
     Material,
     few,
@@ -34,6 +33,8 @@ from masrel.tables._tables import (
     number,
     percent,
 )
+
+_MODEL = Column(key="model", heading="Model", align="left")
 
 
 def grades_section(material: Material) -> Iterator[Content]:
@@ -153,7 +154,7 @@ def _grid_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     yield Table(
         name=f"grades_{grid.session}",
         caption=f"Grades of session {grid.session}: models by raters",
-        columns=(MODEL, _INTENDED, *raters),
+        columns=(_MODEL, _INTENDED, *raters),
         rows=tuple(grid.rows),
         notes=tuple(grid.notes),
         data=material.data,
@@ -192,14 +193,15 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     # of many raters: how often each grade was given; the CSV has who gave it
     grades = material.ratings.scale.grades
     every = np.arange(len(grades))
-    counts = (grid.codes.reshape(len(grid.models), -1)[:, :, None] == every).sum(axis=1)
+    codes = grid.codes.reshape(len(grid.models), -1)
+    counts = (codes[:, :, None] == every).sum(axis=1)
     n_raters = counted(len(grid.raters), "rater")
     text = f"How often {n_raters} gave each grade in session {grid.session}"
     yield Table(
         name=f"grades_{grid.session}",
         caption=text,
         columns=(
-            *(MODEL, _INTENDED),
+            *(_MODEL, _INTENDED),
             *(Column(key=name, heading=name, where="csv") for name in grid.raters),
             *(Column(key=f"n_{g}", heading=g, where="page") for g in grades),
         ),
@@ -210,9 +212,8 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
         notes=(*grid.notes, "The file has the grades of every rater."),
         data=material.data,
     )
-    text += ". Darker is more often, of the grades of the model" + (
-        "; the intended grade is framed" * grid.has_aims
-    )
+    text += ". Darker is more often, of the grades of the model"
+    text += "; the intended grade is framed" * grid.has_aims
     framed = np.array(grid.aims)[:, None] == every
     pictured = (counts, grid.models, grades, framed, ("model", "grade given"))
     yield Drawing(
@@ -238,7 +239,7 @@ def intended_section(material: Material) -> Iterator[Content]:
         name="intended",
         caption=f"Raters who gave the intended grade, session {result.session}",
         columns=(
-            MODEL,
+            _MODEL,
             Column(key="intended_grade", heading="Intended grade", align="center"),
             Column(key="n_ratings", heading="Ratings"),
             Column(key="n_agree", heading="As intended"),
@@ -286,7 +287,7 @@ def in_person_section(material: Material) -> Iterator[Content]:
             f"by the same rater (session {result.session})"
         ),
         columns=(
-            MODEL,
+            _MODEL,
             Column(key="rater", heading="Rater", align="left"),
             Column(key="in_person", heading="In person", align="center"),
             Column(key="haptic", heading="Haptic", align="center"),
@@ -419,7 +420,7 @@ _WITHHELD = (
 _QUESTIONS = (
     Column(key="question", heading="Question", align="left"),
     Column(key="session", heading="Session", align="left"),
-    MODEL,
+    _MODEL,
     Column(key="n", heading="n"),
     Column(key="n_missing", heading="Missing"),
     Column(key="mean_sd", heading="Mean ± SD (n − 1)", where="page"),
@@ -508,4 +509,5 @@ def _half_up(value: float, decimals: int) -> str:
     if math.isnan(value):
         return "undefined"
     unit = Decimal(1).scaleb(-decimals)
-    return str(Decimal(repr(value)).quantize(unit, ROUND_HALF_UP)).replace("-", "−")
+    text = str(Decimal(repr(value)).quantize(unit, ROUND_HALF_UP))
+    return text.replace("-", "−")

@@ -74,7 +74,8 @@ def gather(
     conduct: "StudyConduct | None" = None,
 ) -> Material:
     """Return ratings and their analysis with what every section says of them."""
-    origin = "+".join(sorted({row.source for row in ratings.rows})) or "foreign"
+    sources = sorted({row.source for row in ratings.rows})
+    origin = "+".join(sources) or "foreign"
     counts, study = ratings.simulated_counts, protocol.study
     label = counts.partition(":")[0]
     interim = "" if conduct is None else conduct.interim
@@ -208,8 +209,6 @@ def estimate_titles(lines: Sequence[EstimatePlan]) -> dict[str, str]:
                 titles[line.id] += f", {TARGETS.get(part, part)}"
     return titles
 
-
-MODEL = Column(key="model", heading="Model", align="left")
 
 INTERVAL = (
     Column(key="interval", heading="Interval", where="page"),

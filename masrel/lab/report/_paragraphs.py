@@ -91,9 +91,8 @@ def _further(analysis: Analysis, line: EstimatePlan) -> Iterator[Interval]:
     keys = ("kind", "coefficient", "weights", "models", "sessions")
     for other in analysis.estimates:
         estimate, interval = other.estimate, getattr(other.estimate, "interval", None)
-        is_one = other.line.target != line.target and all(
-            getattr(other.line, k) == getattr(line, k) for k in keys
-        )
+        is_one = all(getattr(other.line, k) == getattr(line, k) for k in keys)
+        is_one &= other.line.target != line.target
         if estimate and interval and is_one and not too_few(estimate):
             yield from [interval] * (not math.isnan(interval.low))
 
@@ -151,7 +150,8 @@ def methods_section(material: Material) -> Iterator[Content]:
     yield Paragraph(text=" ".join(of_numbers))
     yield SUPPLEMENT
     if used:
-        yield References(texts=tuple(reference_texts(used)), bibtex=f"{bibtex(used)}\n")
+        texts = tuple(reference_texts(used))
+        yield References(texts=texts, bibtex=f"{bibtex(used)}\n")
 
 
 def _estimates(planned: PlannedEstimate) -> list[Estimate]:

@@ -139,7 +139,7 @@ def _explain(figure: Figure, handles: Sequence[Any]) -> None:
 def _grid(n_panels: int, n_rows: int) -> tuple[Figure, NDArray[Any]]:
     # -> the figure, and its axes (n_rows, n_panels)
     figure = Figure(figsize=(max(3.4, 0.5 + 2.05 * n_panels), 1.5 + 1.6 * n_rows))
-    return figure, figure.subplots(
+    grid = figure.subplots(
         n_rows,
         n_panels,
         sharex=True,
@@ -147,6 +147,7 @@ def _grid(n_panels: int, n_rows: int) -> tuple[Figure, NDArray[Any]]:
         squeeze=False,
         height_ratios=(1.5, 1.0)[:n_rows],
     )
+    return figure, grid
 
 
 def _finish(figure: Figure, grid: NDArray[Any], torque_label: str) -> None:

@@ -170,10 +170,8 @@ def flow_figure(steps: Sequence[tuple[str, Sequence[str]]]) -> Figure:
         middle = top + height / 2
         shown = ((label, BLACK), ("\n".join(lines), GREY))
         for place, (text, colour) in zip(_BOXES, shown, strict=True):
-            box: dict[str, Any] = {
-                **{"boxstyle": "square,pad=0.4", "facecolor": "white"},
-                **{"edgecolor": colour, "linewidth": 0.8},
-            }
+            box: dict[str, Any] = {"boxstyle": "square,pad=0.4", "facecolor": "white"}
+            box |= {"edgecolor": colour, "linewidth": 0.8}
             if text:
                 axes.text(y=middle, s=text, va="center", bbox=box, **place)
         if before is not None:

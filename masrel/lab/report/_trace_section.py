@@ -32,7 +32,6 @@ from masrel.lab.report._material import (
     MANY_MODELS,
     MANY_RATERS,
     MANY_STRETCHES,
-    MODEL,
     SUPPLEMENT,
     Material,
     at_ranks,
@@ -55,6 +54,7 @@ _AROUND_S = 0.25  # shown before and after a measured stretch
 _SLOWEST_DRAWN_DEG_S = 1.0
 _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
 
+_MODEL = Column(key="model", heading="Model", align="left")
 
 _Floats = NDArray[np.float64]
 
@@ -66,7 +66,8 @@ def speeds_section(material: Material) -> Iterator[Content]:
         yield lacking(None if speeds is None else speeds.reason)
         return
     has_many = _has_many(speeds.values)
-    yield Paragraph(text=text_of("speeds.txt", "speeds", speeds.n_missing, has_many))
+    text = text_of("speeds.txt", "speeds", speeds.n_missing, has_many)
+    yield Paragraph(text=text)
     by_model, by_rater = speed_tables(material)
     yield by_model
     texts = "; ".join(
@@ -227,7 +228,8 @@ def _traced(
         ranks = at_ranks(known)
         shown = [ranks[name] for name in ("lowest", "median", "highest")]
         steps = (np.arange(_N_IN_BAND) + 0.5) / _N_IN_BAND
-        band = _band(joint, [*map(stretch, np.quantile(known, steps).tolist())])
+        quantiles = np.quantile(known, steps).tolist()
+        band = _band(joint, [*map(stretch, quantiles)])
     digits = _whole_or_tenths(known)
     grade = ""
     if model.intended_grade is not None:
@@ -257,10 +259,11 @@ def _band(joint: JointModel, motions: Sequence[Motion]) -> dict[str, _Floats]:
     )
     at = [(motion, np.minimum(time, motion.duration)) for motion in motions]
     band = {"time": time}
-    for name, column in {
+    columns = {
         "angle": [np.degrees(motion.angle(times)) for motion, times in at],
         "torque": [torque_of(motion, times) for motion, times in at],
-    }.items():
+    }
+    for name, column in columns.items():
         ordered = np.sort(np.where(under_way, np.stack(column), np.inf), axis=0)
         band[name] = np.empty((len(_BAND_SHARES), time.size))
         for n in np.unique(n_under_way):
@@ -319,7 +322,7 @@ def _peak_table(
             f"Peak model torque at each rater's mean speed, session {session} (N·m)"
         ),
         columns=(
-            MODEL,
+            _MODEL,
             *(Column(key=f"{r}_nm", heading=r, digits=2, where=where) for r in raters),
             Column(key="least_nm", heading="Min", digits=2),
             Column(key="median_nm", heading="Median", digits=2),
@@ -349,7 +352,8 @@ def measured_blocks(material: Material) -> Iterator[Paragraph | Drawing]:
     if not recordings:
         text = "Measured torque is not in these data: no recording has it."
         yield Paragraph(text=text, absent=True)
-    for nth, first in enumerate(range(0, len(recordings), _PANELS_PER_FIGURE), start=1):
+    starts = range(0, len(recordings), _PANELS_PER_FIGURE)
+    for nth, first in enumerate(starts, start=1):
         shown = recordings[first : first + _PANELS_PER_FIGURE]
         yield _measured_drawing(material, shown, nth)
 

@@ -8,31 +8,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Literal
 
 from masrel._input import refuse
 from masrel.errors import ParameterError
-from masrel.lab import elbow
-from masrel.lab.elbow import (
-    ElbowParameters,
-    JointModel,
-    Motion,
-    Outline,
-    evaluate,
-    outline,
-    residual_torque,
-    tardieu,
-    times_at,
-    trace,
-)
-from masrel.lab.elbow._torque import line
-from masrel.lab.elbow.tone import ToneModel
 from masrel.lab.recording import PHASES
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import aligned, fixed_or_significant, significant
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from masrel.lab.elbow import ElbowParameters, JointModel, Motion, Outline
+    from masrel.lab.elbow.tone import ToneModel
 
 _FIGURES = "masrel.lab.report._stretch_figures:"
 
@@ -66,8 +55,8 @@ class Scene:
     # start_deg, end_deg: where it starts and ends
     start_deg: float
     end_deg: float
-    joint: JointModel
-    motion: Motion
+    joint: "JointModel"
+    motion: "Motion"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +70,8 @@ class Quantities:
 
 def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and what else was requested."""
+    from masrel.lab.elbow import ElbowParameters
+
     joint, motion, kind = scene.joint, scene.motion, {}
     if isinstance(joint, ElbowParameters):
         events = _of_elbow(joint, motion, quantities)
@@ -105,8 +96,10 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
 
 
 def _of_elbow(
-    joint: ElbowParameters, motion: Motion, quantities: Quantities
+    joint: "ElbowParameters", motion: "Motion", quantities: Quantities
 ) -> dict[str, object]:
+    from masrel.lab import elbow
+
     events, outputs = elbow.events(joint, motion), {}
     for name in quantities.outputs:
         number = getattr(elbow, name.replace("-", "_"))(joint, motion)
@@ -135,8 +128,12 @@ def _of_elbow(
 
 
 def _of_tone(
-    joint: ToneModel, motion: Motion, quantities: Quantities
+    joint: "ToneModel", motion: "Motion", quantities: Quantities
 ) -> dict[str, object]:
+    import numpy as np
+
+    from masrel.lab.elbow import times_at, trace
+
     late = [t for t in quantities.times if not 0.0 <= t <= motion.duration]
     refuse(
         (quantities.outputs, f"--output: needs spastic elbows, got {joint.kind}"),
@@ -209,12 +206,10 @@ def _torques(
 def scene_text(document: dict[str, Any], title: str) -> str:
     """Return the document of one scene for a person."""
     columns = (("start_s", 3), ("end_s", 3), ("start_deg", 2), ("end_deg", 2))
-    rows = [
-        ["phase", "start s", "end s", "start deg", "end deg"],
-        *(
-            [span["name"], *(fixed_or_significant(span[key], n) for key, n in columns)]
-            for span in document["phases"]
-        ),
+    rows = [["phase", "start s", "end s", "start deg", "end deg"]]
+    rows += [
+        [span["name"], *(fixed_or_significant(span[key], n) for key, n in columns)]
+        for span in document["phases"]
     ]
     lines = [title]
     for name, *cells in rows:
@@ -227,18 +222,16 @@ def scene_text(document: dict[str, Any], title: str) -> str:
         f"{fixed_or_significant(event['angle_deg'], 2)} deg"
         for event in document.get("events", ())  # of another kind of joint
     ]
-    values = [
-        ("peak torque", document["peak_torque_nm"], "N·m"),
-        *(
-            (name, document[key], unit)
-            for key, name, unit in SCENE_OUTPUTS.values()
-            if key in document
-        ),
-        *(
-            (f"torque at {significant(row[place])} {unit}", row["torque_nm"], "N·m")
-            for key, place, unit in _PLACES
-            for row in document.get(key, ())
-        ),
+    values = [("peak torque", document["peak_torque_nm"], "N·m")]
+    values += [
+        (name, document[key], unit)
+        for key, name, unit in SCENE_OUTPUTS.values()
+        if key in document
+    ]
+    values += [
+        (f"torque at {significant(row[place])} {unit}", row["torque_nm"], "N·m")
+        for key, place, unit in _PLACES
+        for row in document.get(key, ())
     ]
     lines += [
         f"{name} none: the stretch has no catch"
@@ -251,10 +244,8 @@ def scene_text(document: dict[str, Any], title: str) -> str:
 
 def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
     """Return the documents of many scenes for a person, one a line."""
-    keys = [
-        *("speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm"),
-        *(key for key, *_ in SCENE_OUTPUTS.values() if key in documents[0]),
-    ]
+    keys = ["speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm"]
+    keys += [key for key, *_ in SCENE_OUTPUTS.values() if key in documents[0]]
     places = [
         f"torque_nm at {significant(row[place])} {unit}"
         for key, place, unit in _PLACES
@@ -305,6 +296,7 @@ def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
         return Drawn(_FIGURES + "catch_figure", (curves,))
     if view == "schematic":
         return Drawn(_FIGURES + "schematic_figure", _schematic(scenes[0]))
+    from masrel.lab.elbow._torque import line
 
     panels = tuple(
         (
@@ -316,7 +308,9 @@ def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
     return Drawn(_FIGURES + "trace_figure", (panels, view))
 
 
-def _elbows(scenes: Sequence[Scene]) -> list[ElbowParameters]:
+def _elbows(scenes: Sequence[Scene]) -> list["ElbowParameters"]:
+    from masrel.lab.elbow import ElbowParameters
+
     joints = [scene.joint for scene in scenes]
     return [joint for joint in joints if isinstance(joint, ElbowParameters)]
 
@@ -328,7 +322,9 @@ def _label(scene: Scene) -> str:
 
 def _schematic(
     scene: Scene,
-) -> tuple[str, Outline, tuple[float, float, float], str]:
+) -> "tuple[str, Outline, tuple[float, float, float], str]":
+    from masrel.lab.elbow import outline, residual_torque
+
     (joint,) = _elbows([scene])
     line = outline(joint, scene.motion)
     if line.events.catch_speed is None or line.events.peak_end is None:
@@ -337,10 +333,15 @@ def _schematic(
     residual = residual_torque(joint, scene.motion)
     pre_end = residual - joint.residual_share * rise
     share = {"residual": "Q", "decrease": "(1-Q)"}[joint.residual_reading]
-    return scene.title, line, (pre_end, pre_end + rise, residual), rf"${share}\,H\,v_c$"
+    name = rf"${share}\,H\,v_c$"
+    return scene.title, line, (pre_end, pre_end + rise, residual), name
 
 
 def _catches(name: str, scenes: Sequence[Scene]) -> tuple[object, ...]:
+    import numpy as np
+
+    from masrel.lab.elbow import evaluate
+
     joints, motions = _elbows(scenes), [scene.motion for scene in scenes]
     names = ("mean_speed", "catch_angle", "catch", "catch_end")
     outputs = evaluate(joints, motions, names)
@@ -374,10 +375,11 @@ def _catches(name: str, scenes: Sequence[Scene]) -> tuple[object, ...]:
 
 
 def tardieu_document(
-    model: str, joint: JointModel, start_deg: float, speeds: Sequence[float]
+    model: str, joint: "JointModel", start_deg: float, speeds: Sequence[float]
 ) -> dict[str, object]:
     """Return R2, R1, their difference and the catch at V1, V2 and V3 of a joint."""
     # speeds: V1, V2 and V3, deg/s
+    from masrel.lab.elbow import tardieu
 
     first, second, third = map(math.radians, speeds)
     made = tardieu(
@@ -411,10 +413,8 @@ def tardieu_text(documents: Sequence[dict[str, Any]]) -> str:
     ]
     rows = [["model", "R2 deg", "R1 deg", "R2 - R1", *heads]]
     for document in documents:
-        angles = [
-            *(document[key] for key in ("r2_deg", "r1_deg", "difference_deg")),
-            *(catch["catch_angle_deg"] for catch in document["catches"]),
-        ]
+        angles = [document[key] for key in ("r2_deg", "r1_deg", "difference_deg")]
+        angles += [catch["catch_angle_deg"] for catch in document["catches"]]
         cells = ["–" if a is None else fixed_or_significant(a, 2) for a in angles]
         rows.append([document["model"], *cells])
     numeric: list[Literal["right"]] = ["right"] * (len(rows[0]) - 1)

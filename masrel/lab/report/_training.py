@@ -105,7 +105,7 @@ def training_tables(record: TrainingRecord, *, level: float) -> tuple[Table, Tab
 
     freq = Counter((one.intended, one.grade) for one in record.lessons)
     intended = [grade for grade in grades if any(g == grade for g, _ in freq)]
-    return curve, Table(
+    confusion = Table(
         name="training_grades",
         caption=f"Grades of {record.rater} by intended grade, the whole training",
         columns=(
@@ -115,6 +115,7 @@ def training_tables(record: TrainingRecord, *, level: float) -> tuple[Table, Tab
         rows=tuple((one, *(freq[one, grade] for grade in grades)) for one in intended),
         data=data,
     )
+    return curve, confusion
 
 
 def _ends(point: CurvePoint) -> tuple[float, float]:

@@ -56,7 +56,8 @@ def log_interval(
     )
     lenient = msgspec.structs.replace(protocol, sessions=sessions)
     began = replay(log.path, log.events).held_on or log.events[0].time_utc
-    noon = datetime.combine(datetime.fromisoformat(began).astimezone().date(), time(12))
+    day = datetime.fromisoformat(began).astimezone().date()
+    noon = datetime.combine(day, time(12))
     interval = interval_fields(study, lenient, rater, session, lambda: noon)
     before = [e.fields for e in log.events if e.kind == "interval"]
     if interval is not None and interval not in before[-1:]:

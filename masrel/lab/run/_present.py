@@ -272,7 +272,8 @@ def _hand_speeds(protocol: Protocol, request: GradeRequest) -> list[float]:
     # rad/s of the simulated hand, by stretch; none when a person moves the arm
     if not has_simulated_hand(protocol.device):
         return []
-    return [math.radians(speed) for speed in intended_speeds(protocol, key_of(request))]
+    speeds = intended_speeds(protocol, key_of(request))
+    return [math.radians(speed) for speed in speeds]
 
 
 def _hand(

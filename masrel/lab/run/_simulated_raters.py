@@ -126,7 +126,8 @@ class SimulatedGrades(GradeSource):
         if _uniform(seed, "accuracy", key) >= self._settings.accuracy:
             last = len(self._grades) - 1
             neighbours = [c for c in (code - 1, code + 1) if 0 <= c <= last]
-            code = neighbours[int(_uniform(seed, "neighbour", key) * len(neighbours))]
+            share = _uniform(seed, "neighbour", key)
+            code = neighbours[int(share * len(neighbours))]
         return self._grades[code]
 
 

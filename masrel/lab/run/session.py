@@ -177,7 +177,8 @@ def run_session(
     recover_conduct(study)
     refuse_withdrawn(study, rater)
     if rehearsal:
-        study, schedule, checksum = begin_rehearsal(study, protocol, rater, session)
+        begun = begin_rehearsal(study, protocol, rater, session)
+        study, schedule, checksum = begun
     else:
         schedule = _drawn_schedule(study, protocol, rater, session)
         file = study.schedule_file(rater, session)

@@ -246,11 +246,8 @@ def _insertions(
         for parted in range(min(n_pairs, clusters) + 1):
             left = n_pairs - parted + size - clusters
             if left < len(later) and later[left]:
-                ways = (
-                    comb(size - 1, clusters - 1)
-                    * comb(n_pairs, parted)
-                    * comb(n_letters + 1 - n_pairs, clusters - parted)
-                )
+                ways = comb(size - 1, clusters - 1) * comb(n_pairs, parted)
+                ways *= comb(n_letters + 1 - n_pairs, clusters - parted)
                 yield (clusters, parted), ways * later[left]
 
 

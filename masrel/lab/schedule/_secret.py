@@ -230,11 +230,9 @@ class Stream:
 
     def __init__(self, seed: int, *purpose: str, secret: bytes | None = None) -> None:
         name = _named(seed, *purpose)
-        digest = (
-            hashlib.sha256(name).digest()
-            if secret is None
-            else hmac.digest(secret, name, "sha256")
-        )
+        digest = hashlib.sha256(name).digest()
+        if secret is not None:
+            digest = hmac.digest(secret, name, "sha256")
         self._generator = PCG64(0)
         self._generator.state = {
             "bit_generator": "PCG64",

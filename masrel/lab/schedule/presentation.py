@@ -371,7 +371,8 @@ def read_schedule(path: Path) -> Schedule:
 
 def _closed(schedule: Schedule) -> Schedule:
     """Return a schedule without its models."""
-    return replace(schedule, presentations=tuple(map(_hidden, schedule.presentations)))
+    hidden = tuple(map(_hidden, schedule.presentations))
+    return replace(schedule, presentations=hidden)
 
 
 def _hidden(shown: Presentation) -> Presentation:

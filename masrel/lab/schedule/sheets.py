@@ -389,8 +389,7 @@ def _refusal(
             "protocol, or move the log out of the study",
         ),
         (
-            # A blank row, and no other, ends at the comma before the grade.
-            sheet.exists() and any(row[-1] != "," for row in _read_sheet(sheet)[1]),
+            sheet.exists() and _is_filled_in(sheet),
             f"It was not drawn, because {sheet} has grades on it. Move the sheet out "
             "of the study first",
         ),
@@ -405,6 +404,12 @@ def _refusal(
         ),
     )
     return next((f"{fault}. {why}" for is_so, why in rules if is_so), None)
+
+
+def _is_filled_in(sheet: Path) -> bool:
+    # A blank sheet's rows, and none but they, end at the comma before the grade.
+    _, rows = _read_sheet(sheet)
+    return any(not row.endswith(",") for row in rows)
 
 
 def _read_sheet(sheet: Path) -> tuple[list[str], list[str]]:

@@ -172,7 +172,8 @@ class Access:
             if len(self._raters) > _MAX_KNOWN:
                 del self._raters[next(iter(self._raters))]
             text = json.dumps({"format": 1, "tablets": self._raters}, indent=1)
-            write_files({self._tablets_file: f"{text}\n"}, within=self._root)
+            files = {self._tablets_file: f"{text}\n"}
+            write_files(files, within=self._root)
         return self._raters[tablet] == rater
 
     def _signed(self, visitor: Visitor, issued: int) -> str:

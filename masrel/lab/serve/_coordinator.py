@@ -31,7 +31,7 @@ from masrel.lab.conduct import (
 )
 from masrel.lab.conduct._study_log import check_choice, check_rater
 from masrel.lab.progress import study_status
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.run import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
@@ -83,6 +83,10 @@ def _unblind(*where: Any, **fields: Any) -> str:
     )
 
 
+def _note(study: StudyPaths, protocol: Protocol, **fields: Any) -> None:
+    record_note(study, protocol, Note(**fields))
+
+
 _SIGNED = ("who", "why")
 _SESSION = ("rater", "session")
 ACTIONS = {
@@ -93,7 +97,7 @@ ACTIONS = {
         "All {result} schedules are drawn.",
     ),
     "note": _Action(
-        lambda study, protocol, **of: record_note(study, protocol, Note(**of)),
+        _note,
         ("text", "who"),
         {
             "kind": "note",
@@ -196,7 +200,8 @@ class CoordinatorPages(Pages):
         if is_rehearsal:
             # while one starts, the last one is another rehearsal's
             starts = self._manager.state()["screen"] == "starting"
-            file = None if starts else last_rehearsal(self._study, rater, session)
+            of_last = last_rehearsal(self._study, rater, session)
+            file = None if starts else of_last
         with contextlib.suppress(MasrelError, OSError):
             events = () if file is None else read_log(file)[-_N_LOG:]
             return [
@@ -222,7 +227,8 @@ class CoordinatorPages(Pages):
             fields["id"] = secrets.token_hex(8)
         sent = json.dumps([name, fields], sort_keys=True)
         if sent not in self._acts:
-            self._acts[sent] = asyncio.create_task(self._done(name, fields))
+            acting = self._done(name, fields)
+            self._acts[sent] = asyncio.create_task(acting)
             if len(self._acts) > _N_ACTS:
                 self._acts.popitem(last=False)
         return JSONResponse(await asyncio.shield(self._acts[sent]))
@@ -245,7 +251,8 @@ class CoordinatorPages(Pages):
         return {"text": sentence}
 
     def _record(self, action: _Action, fields: Fields) -> str:
-        texts = needed(fields, *action.needed) | {
+        texts = needed(fields, *action.needed)
+        texts |= {
             name: text(fields, name) or usual for name, usual in action.optional.items()
         }
         protocol = read_protocol(self._study.protocol)
@@ -254,7 +261,8 @@ class CoordinatorPages(Pages):
 
     async def _start(self, fields: Fields) -> str:
         where = needed(fields, *_SESSION)
-        await self._manager.start(**where, rehearsal=fields.get("rehearsal") is True)
+        rehearsal = fields.get("rehearsal") is True
+        await self._manager.start(**where, rehearsal=rehearsal)
         return "Session {session} of {rater} is started.".format(**where)
 
     async def _leave(self, fields: Fields) -> str:  # noqa: ARG002 - as all
@@ -299,7 +307,8 @@ def _shown(fields: Any) -> dict[str, Any]:
 def _frame(tail: SampleTail, *, is_sealed: bool) -> dict[str, Any] | None:
     # of a sealed study not what is felt
     columns = ("time_s", "angle_deg", "command_torque_nm", "phase")
-    seconds, angles, torques, phases = tail.new_rows(*columns, every=_EVERY).values()
+    rows = tail.new_rows(*columns, every=_EVERY)
+    seconds, angles, torques, phases = rows.values()
     if not seconds:
         return None
     return {

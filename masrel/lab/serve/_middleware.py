@@ -233,7 +233,8 @@ async def _sent_fields(request: Request) -> dict[str, object]:
         # neither NaN nor half a letter, which no answer and no log can hold
         json.dumps(document, allow_nan=False, ensure_ascii=False).encode()
     except ClientDisconnect:
-        raise HTTPException(400, "The connection ended before its request.") from None
+        why = "The connection ended before its request."
+        raise HTTPException(400, why) from None
     except ValueError:
         document = None
     if not isinstance(document, dict):

@@ -248,7 +248,8 @@ def make_app(manager: SessionManager, access: Access) -> Middleware:
             Route(f"/{role}/events", pages.events),
             Route(f"/{role}/{{action}}", pages.act, methods=["POST"]),
         ]
-    failures = dict.fromkeys((HTTPException, MasrelError, OSError, Exception), _failure)
+    kinds = (HTTPException, MasrelError, OSError, Exception)
+    failures = dict.fromkeys(kinds, _failure)
     return Middleware(Starlette(routes=routes, exception_handlers=failures), access)
 
 

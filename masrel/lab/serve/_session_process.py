@@ -259,7 +259,8 @@ class PageGrades(GradeSource):
                 case {"kind": "correct", **fields}:
                     self._correct(request, fields)
                 case {"kind": "stop"}:
-                    raise _stopped(request, f"by an emergency stop ({message['who']})")
+                    why = f"by an emergency stop ({message['who']})"
+                    raise _stopped(request, why)
                 case {"kind": "leave"}:
                     raise _stopped(request, message.get("why", "on request"))
 

@@ -180,10 +180,8 @@ def _against_schedule(
     # every presentation by its code, also for practice
     every = (*practice_presentations(protocol), *schedule.presentations)
     shown = {presentation.code: presentation for presentation in every}
-    findings += (
-        *_event_findings(protocol, shown, events, log),
-        *time_findings(events, log),
-    )
+    findings += _event_findings(protocol, shown, events, log)
+    findings += time_findings(events, log)
     of = {name: needed[name] for name in ("study", "rater", "session")}
     for event in state.all_presented:
         code = str(event.fields["code"])
@@ -278,10 +276,8 @@ def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedL
     if head["presented_sha256"] != presented_hash(protocol):
         message = "is of models or settings that the protocol had before a change"
         findings.append(doubt(log, message))
-    findings += (
-        *_training_findings(protocol, events, log),
-        *time_findings(events, log),
-    )
+    findings += _training_findings(protocol, events, log)
+    findings += time_findings(events, log)
     presented = [event for event in events if event.kind == "presented"]
     recordings = [study.training / str(e.fields["recording"]) for e in presented]
     of = {**of_study, "session": "training"}

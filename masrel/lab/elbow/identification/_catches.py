@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import detrend, savgol_filter
 
 from masrel.errors import RecordingError
-from masrel.lab.elbow.identification._clusters import Floats, Rows
+from masrel.lab.elbow.identification._clusters import Rows
 from masrel.lab.elbow.identification._reading import (
     MIN_TRAVEL,
     Movement,
@@ -23,8 +23,9 @@ from masrel.lab.elbow.identification._reading import (
 )
 from masrel.lab.elbow.parameters import ElbowParameters
 
+_Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+_Bools = NDArray[np.bool_]
 
 Pace = Literal["slow", "fast"]
 
@@ -75,8 +76,8 @@ def window_length(window: float, period: float) -> int:
 
 
 def differentiate(
-    angle: Floats, period: float, window: float
-) -> tuple[Floats, Floats, Floats]:
+    angle: _Floats, period: float, window: float
+) -> tuple[_Floats, _Floats, _Floats]:
     """Return smoothed angle, velocity, acceleration, without delay.
 
     They are those of the cubic fitted to each window (Savitzky and Golay 1964), and of
@@ -99,8 +100,8 @@ def differentiate(
 
 
 def filter_alike(
-    angle: Floats, torque: Floats, period: float, window: float
-) -> tuple[Floats, Floats, Floats, Floats]:
+    angle: _Floats, torque: _Floats, period: float, window: float
+) -> tuple[_Floats, _Floats, _Floats, _Floats]:
     """Return angle, velocity, acceleration and torque after one filter.
 
     They are of the inner samples: those with a whole window, but for the first and last
@@ -126,7 +127,7 @@ def filter_alike(
 
 
 def state_at_break(
-    time: Floats, angle: Floats, at: float
+    time: _Floats, angle: _Floats, at: float
 ) -> tuple[float, float, float]:
     """Return angle, velocity and acceleration when a hand meets resistance.
 
@@ -159,9 +160,9 @@ class Stretch:
     name: str  # of the recording, with a number if it has several
     recording: Samples = field(compare=False, repr=False)
     samples: Samples = field(compare=False, repr=False)  # of the extension alone
-    angle: Floats = field(compare=False, repr=False)  # smoothed, like the next two
-    velocity: Floats = field(compare=False, repr=False)
-    acceleration: Floats = field(compare=False, repr=False)
+    angle: _Floats = field(compare=False, repr=False)  # smoothed, like the next two
+    velocity: _Floats = field(compare=False, repr=False)
+    acceleration: _Floats = field(compare=False, repr=False)
     pace: Pace
     peak_speed: float
     rest_angle: float  # the smallest of the 0.5 s before
@@ -215,13 +216,13 @@ def find_stretches(
     return stretches, _rest_noise(samples, velocity)
 
 
-def _spans(mask: Bools) -> list[tuple[int, int]]:
+def _spans(mask: _Bools) -> list[tuple[int, int]]:
     # first sample of each run that is marked, and the first after it
     edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _runs(samples: Samples, angle: Floats, velocity: Floats) -> list[tuple[int, int]]:
+def _runs(samples: Samples, angle: _Floats, velocity: _Floats) -> list[tuple[int, int]]:
     # a short rest, without going back, belongs to the extension around it
     runs: list[tuple[int, int]] = []
     for start, stop in _spans(velocity > _MOVING):
@@ -233,7 +234,7 @@ def _runs(samples: Samples, angle: Floats, velocity: Floats) -> list[tuple[int, 
     return runs
 
 
-def _rest_noise(samples: Samples, velocity: Floats) -> float:
+def _rest_noise(samples: Samples, velocity: _Floats) -> float:
     still = (np.abs(velocity) < 0.5 * _MOVING) & ~samples.in_gap & ~samples.saturated
     squares, df = 0.0, 0
     for start, stop in _spans(still):
@@ -250,15 +251,15 @@ class Part(NamedTuple):
     well; `measured` is the torque as recorded.
     """
 
-    time: Floats
-    angle: Floats
-    velocity: Floats
-    acceleration: Floats
-    jerk: Floats
-    torque: Floats
-    measured: Floats
+    time: _Floats
+    angle: _Floats
+    velocity: _Floats
+    acceleration: _Floats
+    jerk: _Floats
+    torque: _Floats
+    measured: _Floats
 
-    def keep(self, which: Bools | _Ints) -> "Part":
+    def keep(self, which: _Bools | _Ints) -> "Part":
         """Return some of the samples."""
         return Part(*(column[which] for column in self))
 
@@ -280,7 +281,7 @@ def filtered_part(samples: Samples, window: float) -> Part:
     )
     unusable = samples.in_gap | samples.saturated
     touched = np.convolve(unusable, np.ones(2 * margin + 1), mode="valid") > 0.5
-    return Part(
+    whole = Part(
         samples.time[margin:-margin],
         angle,
         velocity,
@@ -288,7 +289,8 @@ def filtered_part(samples: Samples, window: float) -> Part:
         _slope(acceleration, samples.period),
         torque,
         samples.torque[margin:-margin],
-    ).keep(~touched)
+    )
+    return whole.keep(~touched)
 
 
 def part_of(stretch: Stretch, which: slice, *, anew: float | None = None) -> Part:
@@ -309,7 +311,7 @@ def part_of(stretch: Stretch, which: slice, *, anew: float | None = None) -> Par
     return Part(samples.time, angle, velocity, acceleration, jerk, torque, torque)
 
 
-def _slope(values: Floats, period: float) -> Floats:
+def _slope(values: _Floats, period: float) -> _Floats:
     return np.gradient(values, period) if values.size > 1 else np.zeros_like(values)
 
 
@@ -343,12 +345,12 @@ class Law:
         """Return whether the torque that is read takes time to step."""
         return self.lag > 0.0 or self.catch_rise > 0.0
 
-    def pre_catch(self, part: Part) -> Floats:
+    def pre_catch(self, part: Part) -> _Floats:
         """Return the torque of (1) without the constant k·θ_rest, N·m."""
         law = self.damping * part.velocity + self.stiffness * part.angle
         return np.asarray(law + self.inertia * part.acceleration)
 
-    def arm(self, part: Part, trial: str) -> Floats:
+    def arm(self, part: Part, trial: str) -> _Floats:
         """Return what weight, inertia and drift add to the torque, N·m."""
         weight = self.gravity * np.sin(part.angle - self.gravity_angle)
         drift = self.drifts.get(trial, self.drift) * part.time
@@ -490,7 +492,7 @@ def _onset(stretch: Stretch, place: int, limit: float) -> tuple[float, float]:
     return time, float(np.interp(time, samples.time, stretch.angle))
 
 
-def _jump(time: Floats, angle: Floats, near: float) -> float:
+def _jump(time: _Floats, angle: _Floats, near: float) -> float:
     # where a motor starts at once, which a filter of speeds sees before it is: rest,
     # and a parabola from an instant on, by least squares
     window = np.abs(time - near) <= 3.0 * _JUMP
@@ -515,16 +517,15 @@ def _after(stretch: Stretch, part: tuple[int, int], catch: Catch, law: Law) -> P
     if catch.end is not None and (additive or law.inertia != 0.0):
         # speed and acceleration are regressors here, as they are before the catch
         first = int(np.searchsorted(stretch.samples.time, catch.end))
-        later = filtered_part(stretch.samples.cut(slice(first, part[1])), _FAST_WINDOW)
+        rest = stretch.samples.cut(slice(first, part[1]))
+        later = filtered_part(rest, _FAST_WINDOW)
         after = after.keep(after.time < catch.end).then(later)
     if law.lag > 0.0:  # no step passes a sensor that lags
         return after
     end = math.inf if catch.end is None else catch.end
-    steps = [
-        min(catch.time + law.constants.peak_duration, end),
-        *[catch.time] * (law.catch_rise == 0.0),
-        *[end] * additive,
-    ]
+    steps = [min(catch.time + law.constants.peak_duration, end)]
+    steps += [catch.time] if law.catch_rise == 0.0 else []
+    steps += [end] if additive else []
     near = np.min([np.abs(after.time - step) for step in steps], axis=0) < _GUARD
     return after.keep(~near)
 
@@ -579,14 +580,14 @@ def catch_levels(trial: Trial, law: Law) -> CatchLevels | None:
 
 
 def find_changes(
-    torque: Floats,
-    pre_catch: Floats,
-    angle: Floats,
+    torque: _Floats,
+    pre_catch: _Floats,
+    angle: _Floats,
     *,
     first: int,
     lengths: tuple[int, int, int],
     additive: bool,
-    pushed: Floats | float = 0.0,
+    pushed: _Floats | float = 0.0,
 ) -> tuple[int | None, int | None, float]:
     """Return the samples where a catch begins and ends, and the residuals' deviation.
 
@@ -648,23 +649,23 @@ _ONE, _TORQUE, _REST, _ANGLE, _LATER = range(5)
 class _Sums(NamedTuple):
     # sums of the products of two of: 1, torque, torque - pre-catch law, angle, and
     # torque - what the law adds after the catch; those of any stretch take no loop
-    before: Floats  # each place, (5, 5, n + 1)
-    at: Floats  # the angle at each place
-    offset: Floats  # what the law adds there
+    before: _Floats  # each place, (5, 5, n + 1)
+    at: _Floats  # the angle at each place
+    offset: _Floats  # what the law adds there
 
     @classmethod
-    def of(cls, *columns: Floats) -> "_Sums":
+    def of(cls, *columns: _Floats) -> "_Sums":
         *varying, offset = columns
         rows = np.stack([np.ones_like(offset), *varying])
         products = np.cumsum(rows[:, None] * rows, axis=2)
         at = np.append(rows[_ANGLE], rows[_ANGLE, -1])
         return cls(np.pad(products, [(0, 0), (0, 0), (1, 0)]), at, offset)
 
-    def between(self, i: int, j: int, low: _Ints, high: _Ints | int = -1) -> Floats:
+    def between(self, i: int, j: int, low: _Ints, high: _Ints | int = -1) -> _Floats:
         before = self.before[i, j]
         return np.asarray(before[high] - before[low])
 
-    def about_mean(self, i: int, low: _Ints, high: _Ints) -> Floats:
+    def about_mean(self, i: int, low: _Ints, high: _Ints) -> _Floats:
         # Σ(x - mean)² over the samples from low to before high; 0 of none
         total = self.between(_ONE, i, low, high)
         mean = total / np.maximum(high - low, 1)
@@ -673,7 +674,7 @@ class _Sums(NamedTuple):
 
 def _squares(
     sums: _Sums, starts: _Ints, ends: _Ints, lengths: tuple[int, ...]
-) -> Floats:
+) -> _Floats:
     # residual sum of squares of every pair, shape (n_starts, n_ends); without `gap`
     # samples after a step, which then may be anywhere between two candidates, and
     # without the two around the end of the peak, whose length is no whole number
@@ -693,8 +694,8 @@ def _squares(
 
 
 def _hinge(
-    sums: _Sums, low: _Ints, end: _Ints, offset: Floats | float
-) -> tuple[Floats, Floats, Floats]:
+    sums: _Sums, low: _Ints, end: _Ints, offset: _Floats | float
+) -> tuple[_Floats, _Floats, _Floats]:
     # Of torque from `low` on, about its mean: its squares, its products with the angle
     # travelled since `end`, and the squares of that.
     n = sums.offset.size

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel._input import warn_caller
 from masrel.errors import RecordingError, RecordingWarning
 from masrel.lab.elbow.identification._catches import Part, filtered_part, window_length
 from masrel.lab.elbow.identification._clusters import (
     FittedParameter,
-    Floats,
     Rows,
     fitted,
     solve,
@@ -26,6 +26,8 @@ from masrel.lab.elbow.identification._reading import (
     even_samples,
     read_movement,
 )
+
+_Floats = NDArray[np.float64]
 
 # Slower, the direction of motion is not certain and the device may stick, rad/s.
 _MOVING = math.radians(5.0)
@@ -41,7 +43,7 @@ class Stroke:
 
     recording: str
     part: Part = field(compare=False, repr=False)
-    fitted: Floats = field(compare=False, repr=False)
+    fitted: _Floats = field(compare=False, repr=False)
 
 
 def _strokes(movement: Movement) -> list[Part]:
@@ -51,8 +53,8 @@ def _strokes(movement: Movement) -> list[Part]:
     whole = filtered_part(samples, _WINDOW)
     # sgn of (7) is one number within the window of the filter, or it is not used
     part = whole.keep(np.abs(whole.velocity) > _MOVING)
-    turns = np.diff(np.sign(part.velocity)) != 0.0
-    breaks = turns | (np.diff(part.time) > 1.5 * samples.period)
+    breaks = np.diff(part.time) > 1.5 * samples.period
+    breaks |= np.diff(np.sign(part.velocity)) != 0.0
     runs = np.split(np.arange(part.time.size), np.flatnonzero(breaks) + 1)
     return [
         part.keep(run[margin:-margin])
@@ -84,7 +86,7 @@ class FrictionFit:
     """
 
     estimates: tuple[FittedParameter, ...]
-    correlation: Floats = field(compare=False, repr=False)
+    correlation: _Floats = field(compare=False, repr=False)
     relative_error: float
     torque_sd: float
     strokes: tuple[Stroke, ...] = field(repr=False)

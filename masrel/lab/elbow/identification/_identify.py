@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from masrel._input import refuse, warn_caller
@@ -44,7 +45,6 @@ from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
     ClusteredFit,
     FittedParameter,
-    Floats,
     Step,
     fitted,
 )
@@ -71,6 +71,8 @@ from masrel.lab.elbow.identification._rounds import (
     untimed_terms,
 )
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
+
+_Floats = NDArray[np.float64]
 
 # Options of `fit` that are tried in a comparison, each alone.
 TERMS = ("gravity", "arm_inertia", "drift", "lag", "rise")
@@ -128,15 +130,15 @@ class ElbowFit:
     """
 
     estimates: tuple[FittedParameter, ...]
-    correlation: Floats = field(compare=False, repr=False)
+    correlation: _Floats = field(compare=False, repr=False)
     steps: tuple[Step, ...]
     relative_error: float
     torque_sd: float
     lack_of_fit: LackOfFit
-    cross_validation: Floats = field(compare=False, repr=False)
+    cross_validation: _Floats = field(compare=False, repr=False)
     trials: tuple[Trial, ...] = field(repr=False)
     levels: tuple[CatchLevels, ...] = field(compare=False, repr=False)
-    fitted_torque: tuple[Floats, ...] = field(compare=False, repr=False)
+    fitted_torque: tuple[_Floats, ...] = field(compare=False, repr=False)
     constants: ElbowParameters
     arm: Mapping[str, float | str]
     offsets: tuple[float, ...] = field(repr=False)
@@ -542,7 +544,7 @@ def _n_censored(last: JointFit) -> int:
 
 def _correlation(
     shared: ClusteredFit, last: JointFit, estimates: Sequence[FittedParameter]
-) -> Floats:
+) -> _Floats:
     names = list(last.shared)
     places = [names.index(e.name) if e.name in names else -1 for e in estimates]
     sd = np.sqrt(np.diag(shared.covariance))
@@ -566,14 +568,14 @@ def _remarks(
     unended = sum(catch.end is None for catch in catches)
     behind = _n_censored(last)
     unused = sum(trial.catch is None for trial in last.fast)
-    remarks = (
+    remarks = [
         f"Torque of {n_from[source]} of {len(movements)} recordings: {text}"
         for source, text in texts.items()
         if n_from[source]
-    )
-    reasons = (
+    ]
+    remarks += [
         f"{ALL_QUANTITIES[e.name].symbol}: {e.reason}" for e in estimates if e.reason
-    )
+    ]
     cautions = (
         (
             behind > 0,
@@ -589,7 +591,7 @@ def _remarks(
         ),
         (unused > 0, f"{unused} of {len(last.fast)} fast stretches are not used"),
     )
-    return (*remarks, *reasons, *(text for is_so, text in cautions if is_so))
+    return (*remarks, *(text for is_so, text in cautions if is_so))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

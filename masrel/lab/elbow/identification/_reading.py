@@ -149,10 +149,8 @@ def _check_sizes(name: str, angle: _Floats, torque: _Floats) -> None:
     low, high = math.degrees(angle.min()), math.degrees(angle.max())
     largest = float(np.abs(torque).max())
     is_small, needed = high - low < math.degrees(MIN_TRAVEL), math.degrees(MIN_TRAVEL)
-    message = (
-        f"{name}: got angles from {low:.4g} to {high:.4g} degrees and torques to "
-        f"{largest:.4g} N·m"
-    )
+    message = f"{name}: got angles from {low:.4g} to {high:.4g} degrees and torques "
+    message += f"to {largest:.4g} N·m"
     refuse(
         (
             largest > _MAX_TORQUE and (is_small or largest < 180.0),

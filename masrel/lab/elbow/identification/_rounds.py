@@ -269,9 +269,8 @@ def _round(
 
 
 def _start(steps: Sequence[Step], law: Law) -> dict[str, float]:
-    start = dict.fromkeys(QUANTITIES, math.nan) | {
-        e.name: e.value for step in steps for e in step.estimates
-    }
+    start = dict.fromkeys(QUANTITIES, math.nan)
+    start |= {e.name: e.value for step in steps for e in step.estimates}
     has_catch = not math.isnan(start["catch_torque_constant"])
     return start | {
         name: float(getattr(law, name))

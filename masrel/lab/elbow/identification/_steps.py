@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 from scipy.special import log_ndtr, stdtrit
 
@@ -17,7 +18,6 @@ from masrel.errors import ConvergenceError
 from masrel.lab.elbow.identification._catches import (
     MIN_GAIN,
     MIN_SIGNAL,
-    Bools,
     Catch,
     CatchLevels,
     Law,
@@ -28,7 +28,6 @@ from masrel.lab.elbow.identification._catches import (
 from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
     FittedParameter,
-    Floats,
     Rows,
     Step,
     fitted,
@@ -40,6 +39,8 @@ from masrel.lab.elbow.identification._equations import (
     mills,
 )
 from masrel.lab.elbow.parameters import ElbowParameters
+
+_Floats = NDArray[np.float64]
 
 # Mean speeds must span this, rad/s: less is one speed, which has no slope.
 _MIN_SPAN = math.radians(5.0)
@@ -122,7 +123,9 @@ def _travel(
     return _step(title, "catch_travel", rows, level, reason)
 
 
-def on_the_line(catches: Sequence[Catch], constants: ElbowParameters) -> Bools:
+def on_the_line(
+    catches: Sequence[Catch], constants: ElbowParameters
+) -> NDArray[np.bool_]:
     """Return which catches are on the line of (2), not where θ_L of (6) holds."""
     speeds = np.array([catch.mean_speed for catch in catches])
     speeds = np.maximum(speeds, constants.slowest_mean_speed)
@@ -140,7 +143,7 @@ def on_the_line(catches: Sequence[Catch], constants: ElbowParameters) -> Bools:
 
 def fit_catch_line(
     catches: Sequence[Catch],
-    on_line: Bools,
+    on_line: NDArray[np.bool_],
     constants: ElbowParameters,
     *,
     level: float,
@@ -161,10 +164,10 @@ def fit_catch_line(
         )
         return Step(name=title, estimates=estimates, residual_sd=math.nan)
 
-    def left(x: Floats) -> Floats:
+    def left(x: _Floats) -> _Floats:
         return np.array([line_row(c, x[0], x[1], slowest)[0] for c in used])
 
-    def slopes(x: Floats) -> Floats:
+    def slopes(x: _Floats) -> _Floats:
         return np.array([line_row(c, x[0], x[1], slowest)[1:] for c in used])
 
     plain = np.polyfit(-speeds, [catch.angle for catch in used], 1)[::-1]
@@ -244,9 +247,9 @@ def _limit(
 class Travels(NamedTuple):
     """Travels that were seen, and limits behind which the others lie, (n,) each."""
 
-    seen: Floats
-    limit: Floats
-    limit_sd: Floats
+    seen: _Floats
+    limit: _Floats
+    limit_sd: _Floats
 
     def log_likelihood(self, mean: float, sd: float) -> float:
         """Evaluate the log-likelihood of normal travels, without its constant."""
@@ -255,7 +258,7 @@ class Travels(NamedTuple):
         density = -0.5 * float(scaled @ scaled) - self.seen.size * math.log(sd)
         return density + float(log_ndtr(z).sum())
 
-    def score(self, mean: float, sd: float) -> Floats:
+    def score(self, mean: float, sd: float) -> _Floats:
         """Differentiate the log-likelihood by mean and sd."""
         scaled = (self.seen - mean) / sd
         # travels scatter, and so does what is seen of an end
@@ -315,7 +318,7 @@ def fit_censored(travels: Travels, *, level: float) -> tuple[FittedParameter, fl
     a, b = (travels.score(mean - h, sd) - travels.score(mean + h, sd)) / (2.0 * h)
     _, d = (travels.score(mean, sd - h) - travels.score(mean, sd + h)) / (2.0 * h)
     variance = d / (a * d - b * b)  # of the mean, the spread being unknown
-    return FittedParameter(
+    estimate = FittedParameter(
         name="catch_travel",
         value=mean,
         standard_error=math.sqrt(variance * number / (number - 1.0)),
@@ -324,7 +327,8 @@ def fit_censored(travels: Travels, *, level: float) -> tuple[FittedParameter, fl
         high=_root(spare, mean, sd),
         level=level,
         n_trials=number + travels.limit.size,
-    ), sd
+    )
+    return estimate, sd
 
 
 def _root(function: Callable[[float], float], start: float, step: float) -> float:
