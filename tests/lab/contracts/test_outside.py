@@ -24,7 +24,7 @@ from tests.lab.hess.rig import LIMITS, START, ActingClock, controls
 
 from .test_registry import declared
 
-PAGE = Path(__file__).parents[3] / "docs/howto/laboratory/hardware.md"
+PAGE = Path(__file__).parents[3] / "docs/howto/laboratory/devices_in_python.md"
 MODULE = re.findall(r'```python\n(""".*?)```', PAGE.read_text("utf-8"), re.DOTALL)[-1]
 
 

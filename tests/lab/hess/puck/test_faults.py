@@ -1,7 +1,7 @@
 """Faults of the bus and the puck itself, each put into a presentation.
 
 ``python -m tests.lab.hess.puck.test_faults`` prints the table of
-docs/howto/laboratory/hardware.md.
+docs/howto/laboratory/hardware_faults.md.
 """
 
 import math
@@ -32,7 +32,7 @@ from tests.lab.hess.puck.rig import (
     puck_options,
 )
 
-PAGE = Path(__file__).parents[4] / "docs/howto/laboratory/hardware.md"
+PAGE = Path(__file__).parents[4] / "docs/howto/laboratory/hardware_faults.md"
 CATCH = 0.7  # HM3 at 92 deg/s is in its catch from 0.63 to 0.96 s
 
 
