@@ -1,4 +1,4 @@
-"""The figures of two pages of docs/howto, judges and preferences, of files they make.
+"""The figures of pages on judges: two of docs/howto, and the tutorial.
 
 ``python -m docs.make.judges`` draws them.
 """
@@ -18,6 +18,10 @@ CALLS = {
     ),
     "judges_corrected.png": ("monitor.csv", "--judge", "large", "--rate", "pass"),
     "judges_strengths.png": ("preferences.csv", "--order", "first"),
+    "tutorial_judge.png": (
+        *(str(ROOT / "docs/tutorials/replies.csv"), "--judge", "llm"),
+        *("--annotators", "skilled", "--target", "items", "--item-name", "replies"),
+    ),
 }
 
 

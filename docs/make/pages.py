@@ -3,7 +3,8 @@
 ``python -m docs.make.pages [PAGE ...]`` rewrites the output that pages show, all of
 them unless some are named. ``tests/docs/test_pages.py`` compares a page with that.
 
-A page is run from top to bottom in a new folder that has a copy of ``studies``:
+A page is run from top to bottom in a new folder that has a copy of ``studies`` and of
+the data files of the tutorials:
 
 - blocks of Python in one namespace. What they print stands in ``# prints`` comments
   (``...`` for any line), or after the word "prints" in a block of text;
@@ -176,6 +177,8 @@ def _new_folder() -> Iterator[str]:
     ):
         warnings.simplefilter("error")
         shutil.copytree(ROOT / "studies", "studies")
+        for file in (ROOT / "docs" / "tutorials").glob("*.csv"):
+            shutil.copy(file, folder)
         try:
             yield folder
         finally:
