@@ -8,8 +8,11 @@ from tests.golden.call import Case
 from tests.golden.compare import changes
 from tests.golden.store import GROUPS, differing, load
 
-EXACT = dict.fromkeys(GROUPS, True)
-"""Whether a group is compared bit for bit; to the bars of `compare` otherwise."""
+EXACT = dict.fromkeys(GROUPS, True) | {"grading": False}
+"""Whether a group is compared bit for bit; to the bars of `compare` otherwise.
+
+Last digits of a maximum of likelihood depend on the processor.
+"""
 
 MOST_SAID = 15
 

@@ -162,8 +162,9 @@ def grade_regression(
 
     Notes
     -----
-    P(grade ≤ g) = 1/(1 + exp(x·β - τ_g)), by maximum likelihood (statsmodels,
-    `OrderedModel`). Whether a maximum exists is settled first, by a linear program:
+    P(grade ≤ g) = 1/(1 + exp(x·β - τ_g)), by maximum likelihood: the maximum that
+    statsmodels' `OrderedModel` finds, to the last digits by Newton's steps. Errors are
+    a sandwich of exact derivatives. Whether a maximum exists is settled first, by a linear program:
     it does not if some direction of β and τ makes no rating less likely [1]_. Models
     on straight lines between others, as dummies are, do not help to tell L, H, Q and
     D apart: they lie in the space of those at the ends.
@@ -354,19 +355,51 @@ def _fit(
     from statsmodels.miscmodels.ordinal_model import OrderedModel
 
     model = OrderedModel(codes, values, distr="logit")
-    clusters = {"groups": raters, "use_correction": False}
-    result = model.fit(
-        method="bfgs",
-        disp=False,
-        gtol=1e-8,
-        maxiter=1000,
-        cov_type="cluster",
-        cov_kwds=clusters,
-    )
+    result = model.fit(method="bfgs", disp=False, gtol=1e-8, maxiter=1000)
     p, n_raters = values.shape[1], int(raters.max()) + 1
-    errors = result.bse[:p] * math.sqrt(n_raters / (n_raters - 1))
-    thresholds = np.asarray(model.transform_threshold_params(result.params))[1:-1]
-    return [np.asarray(result.params[:p]), errors, thresholds], float(result.llf)
+    thresholds = model.transform_threshold_params(result.params)[1:-1]
+    estimate = np.concatenate([result.params[:p], thresholds])
+    # The optimizer's derivatives are differences, which are right to some 8 digits and
+    # depend on the processor. From there on Newton's steps by the exact ones double
+    # the digits.
+    for _ in range(3):
+        scores, information = _derivatives(estimate, values, codes)
+        estimate += np.linalg.solve(information, scores.sum(axis=0))
+    scores, information = _derivatives(estimate, values, codes)
+    sums = np.zeros((n_raters, estimate.size))
+    np.add.at(sums, raters, scores)
+    influences = np.linalg.solve(information, sums.T)  # (n_parameters, n_raters)
+    errors = np.sqrt((influences**2).sum(axis=1) * n_raters / (n_raters - 1))
+    return [estimate[:p], errors[:p], estimate[p:]], float(result.llf)
+
+
+def _derivatives(
+    estimate: _Floats, values: _Floats, codes: NDArray[np.int64]
+) -> tuple[_Floats, _Floats]:
+    """Return each rating's score and the observed information, in β and τ."""
+    from scipy.special import expit
+
+    # log P(grade) = log F(u) + log F(-l) + log(1 - exp(l - u)), with the ends
+    # u = τ_g - x·β and l = τ_(g-1) - x·β, of which the outermost are infinite
+    n, p = values.shape
+    rows = np.arange(n)
+    slopes = np.zeros((2, n, estimate.size + 2))  # of u and l; τ from -inf to inf
+    slopes[:, :, :p] = -values
+    slopes[0, rows, p + 1 + codes] = slopes[1, rows, p + codes] = 1.0
+    slopes = np.delete(slopes, [p, -1], axis=2)
+    ends = np.concatenate([[-np.inf], estimate[p:], [np.inf]]) - (
+        values @ estimate[:p, None]
+    )
+    u, low = ends[rows, codes + 1], ends[rows, codes]
+    with np.errstate(over="ignore"):  # a grade as wide as that has only its ends
+        between = 1.0 / np.expm1(u - low)
+        joint = 0.25 / np.sinh(0.5 * (u - low)) ** 2
+    scores = np.einsum(
+        "tn,tni->ni", [expit(-u) + between, -expit(low) - between], slopes
+    )
+    weights = [expit(u) * expit(-u), expit(low) * expit(-low), joint]
+    terms = np.concatenate([slopes, slopes[:1] - slopes[1:]])
+    return scores, np.einsum("tn,tni,tnj->ij", weights, terms, terms, optimize=True)
 
 
 def _odds_ratio(coefficient: float) -> float:
