@@ -97,17 +97,35 @@ def test_more_grades_maximize_the_likelihood_written_out(tmp_path: Path) -> None
     table, x = ratings.table, predictors(protocol, ratings)
     codes = np.array([found.grades.index(g) for g in table["grade"]])
 
-    def loss(v: np.ndarray) -> float:
+    def losses(v: np.ndarray) -> np.ndarray:  # of each rating
         cuts = np.concatenate([[-np.inf], v[2:], [np.inf]])
         drive = x @ v[:2]
         below = 1.0 / (1.0 + np.exp(drive - cuts[codes]))
         to_here = 1.0 / (1.0 + np.exp(drive - cuts[codes + 1]))
-        return -float(np.log(to_here - below).sum())
+        return -np.log(to_here - below)
 
-    best = minimize(loss, [1.0, 0.5, *np.linspace(-1, 1, len(found.grades) - 1)])
+    best = minimize(
+        lambda v: losses(v).sum(),
+        [1.0, 0.5, *np.linspace(-1, 1, len(found.grades) - 1)],
+    )
     assert found.log_likelihood == pytest.approx(-best.fun, rel=1e-7)
     values = [effect.coefficient for effect in found.effects]
-    np.testing.assert_allclose([*values, *found.thresholds], best.x, atol=2e-3)
+    fit = np.array([*values, *found.thresholds])
+    np.testing.assert_allclose(fit, best.x, atol=2e-3)
+    # errors: the sandwich of derivatives by differences, right to some 1e-7
+    steps = 1e-4 * np.eye(fit.size)
+    slopes = np.array([(losses(fit + d) - losses(fit - d)) / 2e-4 for d in steps])
+    bends = [
+        [(losses(fit + d + e) - losses(fit + d - e)).sum() for e in steps]
+        for d in np.concatenate([steps, -steps])
+    ]
+    information = (np.array(bends[: fit.size]) - bends[fit.size :]) / 4e-8
+    raters, names = table["rater"].factorize()
+    sums = np.stack([slopes[:, raters == r].sum(axis=1) for r in range(names.size)])
+    influences = np.linalg.solve(information, sums.T)
+    wanted = np.sqrt((influences**2).sum(axis=1) * names.size / (names.size - 1))
+    errors = [effect.standard_error for effect in found.effects]
+    np.testing.assert_allclose(errors, wanted[:2], rtol=1e-5)
 
 
 def test_what_was_put_in_is_covered_and_the_rest_is_not_found(tmp_path: Path) -> None:
