@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from masrel.analysis._file_estimates import Estimating
     from masrel.ratings._findings import Reading
 
-__version__ = "0.2.0.dev0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Agreement",
