@@ -164,8 +164,8 @@ def grade_regression(
     -----
     P(grade ≤ g) = 1/(1 + exp(x·β - τ_g)), by maximum likelihood: the maximum that
     statsmodels' `OrderedModel` finds, to the last digits by Newton's steps. Errors are
-    a sandwich of exact derivatives. Whether a maximum exists is settled first, by a linear program:
-    it does not if some direction of β and τ makes no rating less likely [1]_. Models
+    a sandwich of exact derivatives. A linear program first settles whether a maximum
+    exists: not if some direction of β and τ makes no rating less likely [1]_. Models
     on straight lines between others, as dummies are, do not help to tell L, H, Q and
     D apart: they lie in the space of those at the ends.
 
@@ -327,7 +327,7 @@ def _is_separated(values: _Floats, codes: NDArray[np.int64]) -> bool:
     from scipy.optimize import linprog
 
     # A direction (β, τ) in which no rating's interval τ_(g-1) < x·β < τ_g shrinks at
-    # either end, and some end moves away: then the likelihood grows for ever.
+    # either end, and some end moves away: then the likelihood grows without limit.
     n, p = values.shape
     n_thresholds = int(codes.max())
     upper, lower = codes < n_thresholds, codes > 0
