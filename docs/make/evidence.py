@@ -2,7 +2,6 @@
 
 import csv
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 from pathlib import Path
 
 EVIDENCE = Path(__file__).parents[1] / "evidence"
@@ -15,26 +14,11 @@ def write_rows(name: str, rows: Sequence[Mapping[str, object]]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({key: _cell(x) for key, x in row.items()} for row in rows)
+        writer.writerows({key: cell(x) for key, x in row.items()} for row in rows)
 
 
-def write_tables(names: Sequence[str], lines: Sequence[str]) -> None:
-    """Write each table among lines of Markdown as ``benchmarks_NAME.csv``."""
-    every = "\n".join(lines).split("\n")
-    groups = groupby(every, key=lambda line: line.startswith("|"))
-    tables = [list(table) for is_table, table in groups if is_table]
-    for name, (head, _, *rows) in zip(names, tables, strict=True):
-        write_rows(
-            f"benchmarks_{name}",
-            [dict(zip(_cells(head), _cells(row), strict=True)) for row in rows],
-        )
-
-
-def _cells(line: str) -> list[str]:
-    return [cell.strip() for cell in line.strip("|").split("|")]
-
-
-def _cell(value: object) -> object:
+def cell(value: object) -> object:
+    """Return what is written of a value."""
     is_long = isinstance(value, float) and len(repr(value)) > 8
     return f"{value:.4g}" if is_long else value
 

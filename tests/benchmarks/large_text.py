@@ -1,13 +1,5 @@
-"""A large file of text: ``masrel agree`` beside what pandas and DuckDB take for it."""
+"""A large file of text, and what others take for it."""
 
-import os
-import statistics
-import subprocess
-import sys
-import tempfile
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +8,6 @@ N_RATERS = 5
 N_GRADES = 4
 ORDERS = ("item by item", "rater by rater", "shuffled")
 _BLOCK = 1 << 19  # rows that are written at once
-_COMPILED = Path(tempfile.gettempdir()) / "masrel_compiled"
 
 PANDAS = """
 import sys
@@ -40,15 +31,6 @@ with duckdb.connect() as database:
 """
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """What a process took: seconds of the clock, of processors, and megabytes."""
-
-    wall_s: float
-    processor_s: float
-    megabytes: float
-
-
 def write_ratings(path: Path, n_items: int, order: str) -> None:
     """Write ratings of some agreement, one row a rating, in one of the `ORDERS`."""
     rng = np.random.default_rng(20120831)
@@ -68,52 +50,3 @@ def write_ratings(path: Path, n_items: int, order: str) -> None:
             cells = block // N_RATERS + 1, block % N_RATERS + 1, grade[block]
             each = zip(*(column.tolist() for column in cells), strict=True)
             file.write("".join(f"item{i:07},rater{r},{g}\n" for i, r, g in each))
-
-
-def programs(path: Path) -> dict[str, list[str]]:
-    """Return the commands that are compared."""
-    python = sys.executable
-    return {
-        "masrel": [python, "-m", "masrel", "agree", str(path)],
-        "pandas": [python, "-c", PANDAS, str(path)],
-        "DuckDB": [python, "-c", DUCKDB, str(path)],
-    }
-
-
-def run(command: Sequence[str]) -> Run:
-    """Run a process, its modules compiled as pip leaves what it installs."""
-    environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(_COMPILED)}
-    environment |= {"OPENBLAS_NUM_THREADS": "1"}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)
-    start = time.perf_counter()
-    with subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
-    ) as process:
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    wall_s = time.perf_counter() - start
-    if process.returncode:
-        raise SystemExit(f"{' '.join(command[-3:])}: ended with {process.returncode}")
-    return Run(
-        wall_s=wall_s,
-        processor_s=usage.ru_utime + usage.ru_stime,
-        megabytes=usage.ru_maxrss / 1e3,
-    )
-
-
-def measured(path: Path, turns: int) -> dict[str, list[Run]]:
-    """Run all in turn, warm, so that all meet the same load."""
-    commands = programs(path)
-    for command in commands.values():
-        run(command)
-    runs: dict[str, list[Run]] = {name: [] for name in commands}
-    for _ in range(turns):
-        for name, command in commands.items():
-            runs[name].append(run(command))
-    return runs
-
-
-def ratio(ours: Sequence[float], theirs: Sequence[float]) -> tuple[float, float]:
-    """Return the median of ratios turn by turn, and half their range."""
-    ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
-    return statistics.median(ratios), (max(ratios) - min(ratios)) / 2

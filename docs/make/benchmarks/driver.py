@@ -5,14 +5,14 @@ docs/evidence/driver.md says, and draws its figures; SECONDS is how long the rea
 clock runs for each of three loops.
 """
 
-import itertools
-import statistics
 import sys
 import time
 import warnings
 from array import array
+from collections.abc import Callable
+from functools import partial
+from itertools import chain, repeat
 from math import radians
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -36,10 +36,10 @@ from masrel.lab.hess import (
 )
 from masrel.lab.hess._clock import real_time
 from tests.benchmarks import driver_integrators
+from tests.benchmarks.sidebyside import middle, side_by_side
 
 START, END = radians(30.0), radians(146.0)
 STRETCH_S = 116.0 / 92.0
-FIGURES = Path(__file__).parents[2] / "figures"
 PERIOD_NS = 1_000_000
 SEGMENT_S = 5.0
 
@@ -95,8 +95,17 @@ class TickClock(SimulatedClock):
         super().sleep_until_ns(deadline_ns)
 
 
-def presented(clock: SimulatedClock, hand: SimulatedHand | None) -> int:
+HAND = {"start": START, "end": END, "mean_speed": radians(92.0)}
+KINDS: dict[str, Callable[[], SimulatedHand | None]] = {
+    "prescribed motion": lambda: None,
+    "simulated arm and hand": lambda: SimulatedHand(**HAND),
+    "the same, a person's hand": lambda: HumanHand(HandTraits(), **HAND),
+}
+
+
+def presented(kind: str, clock: SimulatedClock) -> int:
     """One presentation of HM3 -> ticks."""
+    hand = KINDS[kind]()
     controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     if hand is None:
         device: Device = Prescribed(clock, minimum_jerk(1500))
@@ -111,33 +120,23 @@ def presented(clock: SimulatedClock, hand: SimulatedHand | None) -> int:
 
 
 def tick_costs(turns: int = 40) -> None:
-    """Print the cost of a tick and the speed of a presentation, in turn."""
-    options = {"start": START, "end": END, "mean_speed": radians(92.0)}
-    kinds = {
-        "prescribed motion": lambda: None,
-        "simulated arm and hand": lambda: SimulatedHand(**options),
-        "the same, a person's hand": lambda: HumanHand(HandTraits(), **options),
+    """Print the cost of a tick and the speed of a presentation."""
+    calls = {
+        kind: lambda kind=kind: presented(kind, SimulatedClock()) for kind in KINDS
     }
-    costs: dict[str, list[float]] = {name: [] for name in kinds}
-    speeds: dict[str, list[float]] = {name: [] for name in kinds}
-    walls: dict[str, list[float]] = {name: [] for name in kinds}
-    for _ in range(turns):
-        for name, hand in kinds.items():
-            clock = TickClock()
-            presented(clock, hand())
-            costs[name] += np.diff(clock.times[: clock.n]).tolist()
-            start, used = time.perf_counter(), time.thread_time()
-            n_ticks = presented(SimulatedClock(), hand())
-            used, took = time.thread_time() - used, time.perf_counter() - start
-            speeds[name].append(n_ticks * 1e-3 / used)
-            walls[name].append(n_ticks * 1e-3 / took)
+    samples = side_by_side(calls, turns=turns)
     print("of processor time, but for the last column; medians of", turns)
     print(f"{'':30} tick p50 µs   p99.9 µs   times real time   by the wall")
-    for name in kinds:
-        median, high = np.percentile(costs[name], [50.0, 99.9]) / 1e3
-        speed = statistics.median(speeds[name])
-        wall = statistics.median(walls[name])
-        print(f"{name:30} {median:11.1f} {high:10.1f} {speed:17.0f} {wall:13.0f}")
+    for kind, of in samples.items():
+        clocks = [TickClock() for _ in range(turns)]
+        for clock in clocks:
+            presented(kind, clock)
+        costs = np.concatenate([np.diff(clock.times[: clock.n]) for clock in clocks])
+        median, high = np.percentile(costs, [50.0, 99.9]) / 1e3
+        simulated_s = of[0].result * 1e-3
+        speed = simulated_s / middle([sample.seconds for sample in of])[0]
+        wall = simulated_s / middle([sample.clock for sample in of])[0]
+        print(f"{kind:30} {median:11.1f} {high:10.1f} {speed:17.0f} {wall:13.0f}")
 
 
 class LateClock(RealClock):
@@ -160,9 +159,7 @@ def loop(seconds: float) -> tuple[list[int], int]:
     n = round(seconds * 1000)
     clock = LateClock(2 * n)
     forth = minimum_jerk(1500)
-    stretches = itertools.chain.from_iterable(
-        itertools.repeat(forth + forth[::-1], n // 3000 + 1)
-    )
+    stretches = chain.from_iterable(repeat(forth + forth[::-1], n // 3000 + 1))
     limits = DeviceLimits(
         missed_ticks=n,
         watchdog_time=10.0,
@@ -187,25 +184,8 @@ def loop(seconds: float) -> tuple[list[int], int]:
     return list(clock.late[: clock.n]), done.n_missed_ticks
 
 
-def nothing(seconds: float) -> tuple[list[int], int]:
-    """The same loop doing nothing -> lateness ns, missed ticks."""
-    n = round(seconds * 1000)
-    clock = LateClock(2 * n)
-    with real_time():
-        n_missed, tick = 0, 0
-        start_ns = clock.now_ns()
-        while tick < n:
-            tick += 1
-            due_ns = start_ns + tick * PERIOD_NS
-            clock.sleep_until_ns(due_ns)
-            skipped = (clock.now_ns() - due_ns) // PERIOD_NS
-            n_missed += skipped
-            tick += skipped
-    return list(clock.late[: clock.n]), n_missed
-
-
 def ordinary(seconds: float) -> tuple[list[int], int]:
-    """Nothing again, at ordinary priority."""
+    """The same loop doing nothing, at ordinary priority -> the same."""
     n = round(seconds * 1000)
     clock = LateClock(2 * n)
     n_missed, tick = 0, 0
@@ -220,40 +200,42 @@ def ordinary(seconds: float) -> tuple[list[int], int]:
     return list(clock.late[: clock.n]), n_missed
 
 
+def nothing(seconds: float) -> tuple[list[int], int]:
+    """The same at the priority of the control loop."""
+    with real_time():
+        return ordinary(seconds)
+
+
 def lateness(seconds: float) -> dict[str, NDArray[np.float64]]:
     """Print how late ticks are, three loops in turn, segment by segment."""
     loops = {"control loop": loop, "nothing": nothing, "nothing, ordinary": ordinary}
-    late: dict[str, list[int]] = {name: [] for name in loops}
-    missed = dict.fromkeys(loops, 0)
-    for _ in range(max(1, round(seconds / SEGMENT_S))):
-        for name, run in loops.items():
-            late_ns, n_missed = run(min(seconds, SEGMENT_S))
-            late[name] += late_ns
-            missed[name] += n_missed
+    runs = side_by_side(
+        {name: partial(run, min(seconds, SEGMENT_S)) for name, run in loops.items()},
+        turns=max(1, round(seconds / SEGMENT_S)),
+    )
     with real_time() as granted:
         print(f"granted: {granted}")
     print(f"{'lateness, µs':20}     p50     p99   p99.9     max   missed of")
-    for name in loops:
-        late_us = np.array(late[name]) / 1e3
-        quantiles = np.percentile(late_us, [50, 99, 99.9, 100])
+    late_us = {}
+    for name, samples in runs.items():
+        late_us[name] = np.concatenate([of.result[0] for of in samples]) / 1e3
+        n_missed = sum(of.result[1] for of in samples)
+        quantiles = np.percentile(late_us[name], [50, 99, 99.9, 100])
         cells = " ".join(f"{v:7.0f}" for v in quantiles)
-        print(f"{name:20} {cells} {missed[name]:8} {late_us.size}")
-    return {name: np.array(late_ns) / 1e3 for name, late_ns in late.items()}
+        print(f"{name:20} {cells} {n_missed:8} {late_us[name].size}")
+    return late_us
 
 
 def main() -> None:
     tick_costs()
     late = lateness(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)
-    driver_figures.draw_lateness(late, FIGURES / "driver_lateness.png")
+    driver_figures.draw_lateness(late)
     integrators = driver_integrators.measured()
     for name, points in integrators.items():
         for setting, seconds, error in points:
             print(f"{name:22} {setting:8.2g}  {seconds:9.5f} s/s  {error:.2e} N·m")
-    driver_figures.draw_integrators(integrators, FIGURES / "driver_integrators.png")
-    driver_figures.draw_traces(FIGURES / "driver_traces.png")
-    driver_figures.draw_measured(FIGURES / "driver_measured.png")
-    driver_figures.draw_backdrive(FIGURES / "driver_backdrive.png")
-    driver_figures.draw_slip(FIGURES / "driver_slip.png")
+    driver_figures.draw_integrators(integrators)
+    driver_figures.draw_simulated()
 
 
 if __name__ == "__main__":

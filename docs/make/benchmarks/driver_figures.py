@@ -1,15 +1,15 @@
 """The figures of docs/evidence/driver.md; everything in them is simulated."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from math import radians
-from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from docs.make.benchmarks.figures import chart, plain_figure
+from docs.make.evidence import FIGURES
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     Controller,
@@ -21,7 +21,7 @@ from masrel.lab.hess import (
     run_presentation,
 )
 from masrel.lab.recording import MEASURED_TORQUE, Recording
-from masrel.lab.report._material import FIGURES
+from masrel.lab.report._material import FIGURES as MATERIAL
 from masrel.lab.report._trace_section import measured_panel
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
@@ -48,64 +48,56 @@ LINES = {"HM1": ":", "HM2": "-.", "HM3": "--", "HM4": "-"}
 COLOURS = {"HM1": GREEN, "HM2": ORANGE, "HM3": VERMILLION, "HM4": BLUE}
 
 
-def _figure(width: float = 5.6, height: float = 3.6) -> Figure:
-    mpl.rcParams.update({"font.size": 9, "axes.spines.top": False})
-    mpl.rcParams.update({"axes.spines.right": False, "savefig.dpi": 200})
-    return Figure(figsize=(width, height), layout="constrained")
+GRID = {"color": "#DDDDDD", "linewidth": 0.6}
 
 
-def draw_integrators(
-    integrators: Mapping[str, list[tuple[float, float, float]]], path: Path
-) -> None:
+def draw_integrators(integrators: Mapping[str, list[tuple[float, ...]]]) -> None:
     """Draw the processor time of a simulated second against the largest error."""
-    figure = _figure()
-    axes = figure.add_subplot()
-    for name, points in integrators.items():
-        colour, marker, line = STYLES[name]
-        axes.loglog(
-            [seconds for _, seconds, _ in points],
-            [error for *_, error in points],
-            color=colour,
-            marker=marker,
-            linestyle=line,
-            markersize=5,
-            label=name,
+    legend = {"loc": "lower left", "fontsize": 8}
+    x = "processor time of a simulated second (s)"
+    y = "largest error of the hand's torque (N·m)"
+    with chart("driver_integrators", x=x, y=y, height=3.6, **legend) as axes:
+        for name, points in integrators.items():
+            _, seconds, errors = zip(*points, strict=True)
+            colour, marker, line = STYLES[name]
+            look = {"color": colour, "marker": marker, "linestyle": line}
+            axes.loglog(seconds, errors, markersize=5, label=name, **look)
+        (shipped,) = (of for of in integrators["exact step"] if of[0] == 0.0005)
+        axes.annotate(
+            "as shipped: 0.5 ms",
+            shipped[1:],
+            (7, 1),
+            textcoords="offset points",
+            color=BLUE,
+            ha="left",
         )
-    for setting, seconds, error in integrators["exact step"]:
-        if setting == 0.0005:
-            axes.annotate(
-                "as shipped: 0.5 ms",
-                (seconds, error),
-                (7, 1),
-                textcoords="offset points",
-                color=BLUE,
-                ha="left",
-            )
-    axes.axhline(18.8 / 2700.0, color=GREY, linewidth=0.8)
-    axes.text(0.05, 18.8 / 2700.0 * 1.2, "torque quantum", color=GREY, ha="center")
-    axes.set_xlabel("processor time of a simulated second (s)")
-    axes.set_ylabel("largest error of the hand's torque (N·m)")
-    axes.grid(color="#DDDDDD", linewidth=0.6)
-    axes.legend(frameon=False, loc="lower left", fontsize=8)
-    figure.savefig(path)
+        quantum = 18.8 / 2700.0
+        axes.axhline(quantum, color=GREY, linewidth=0.8)
+        axes.text(0.05, quantum * 1.2, "torque quantum", color=GREY, ha="center")
+        axes.grid(**GRID)
 
 
-def draw_lateness(loops: Mapping[str, NDArray[np.float64]], path: Path) -> None:
+def draw_lateness(loops: Mapping[str, NDArray[np.float64]]) -> None:
     """Draw the share of ticks that are later than a time."""
-    figure = _figure()
-    axes = figure.add_subplot()
-    styles = ((BLUE, "-"), (BLACK, "--"), (GREY, ":"))
-    for (name, late), (colour, line) in zip(loops.items(), styles, strict=True):
-        ordered = np.sort(np.maximum(late, 1.0))
-        share = 1.0 - np.arange(ordered.size) / ordered.size
-        axes.loglog(ordered, share, color=colour, linestyle=line, label=name)
-    axes.axvline(1000.0, color=GREY, linewidth=0.8)
-    axes.text(1060.0, 0.4, "a tick is missed", color=GREY, fontsize=8)
-    axes.set_xlabel("lateness (µs)")
-    axes.set_ylabel("share of ticks that are later")
-    axes.grid(color="#DDDDDD", linewidth=0.6)
-    axes.legend(frameon=False, loc="lower left", fontsize=8)
-    figure.savefig(path)
+    legend = {"loc": "lower left", "fontsize": 8}
+    x, y = "lateness (µs)", "share of ticks that are later"
+    with chart("driver_lateness", x=x, y=y, height=3.6, **legend) as axes:
+        styles = ((BLUE, "-"), (BLACK, "--"), (GREY, ":"))
+        for (name, late), (colour, line) in zip(loops.items(), styles, strict=True):
+            ordered = np.sort(np.maximum(late, 1.0))
+            share = 1.0 - np.arange(ordered.size) / ordered.size
+            axes.loglog(ordered, share, color=colour, linestyle=line, label=name)
+        axes.axvline(1000.0, color=GREY, linewidth=0.8)
+        axes.text(1060.0, 0.4, "a tick is missed", color=GREY, fontsize=8)
+        axes.grid(**GRID)
+
+
+def draw_simulated() -> None:
+    """Draw what the simulated device does, which is the same whenever it is run."""
+    draw_traces()
+    draw_measured()
+    draw_backdrive()
+    draw_slip()
 
 
 def recorded(model: str, speed_deg_s: float, **options) -> Recording:
@@ -124,39 +116,46 @@ def recorded(model: str, speed_deg_s: float, **options) -> Recording:
         ).recording
 
 
-def draw_traces(path: Path) -> None:
-    """Draw torque and angle over time of the four models at one speed."""
-    figure = _figure(5.6, 4.6)
-    upper, lower = figure.subplots(2, sharex=True, height_ratios=(2.2, 1.0))
-    for model, line in LINES.items():
-        columns = recorded(model, 92.0).columns
-        style = {"color": COLOURS[model], "linestyle": line, "linewidth": 1.3}
-        upper.plot(columns["time_s"], columns["model_torque_nm"], label=model, **style)
-        lower.plot(columns["time_s"], columns["angle_deg"], **style)
-    upper.set_ylabel("torque of the model (N·m)")
+@contextmanager
+def two_panels(name: str, title: str, **options: object) -> Iterator[tuple[Axes, Axes]]:
+    """Give panels above each other to draw in, with lines and a legend afterwards."""
+    figure = plain_figure(5.6, 4.6)
+    upper, lower = figure.subplots(2, sharex=True, **options)
+    yield upper, lower
     upper.legend(frameon=False, loc="upper left", fontsize=8)
-    lower.set_ylabel("angle (deg)")
-    lower.set_xlabel("time (s)")
     for axes in (upper, lower):
-        axes.grid(color="#DDDDDD", linewidth=0.6)
-    figure.suptitle("HM1 to HM4 at 92 deg/s, simulated device", fontsize=9)
-    figure.savefig(path)
+        axes.grid(**GRID)
+    figure.suptitle(title, fontsize=9)
+    figure.savefig(FIGURES / f"{name}.png")
 
 
-def draw_measured(path: Path) -> None:
+def draw_traces() -> None:
+    """Draw torque and angle over time of the four models at one speed."""
+    title, ratios = "HM1 to HM4 at 92 deg/s, simulated device", (2.2, 1.0)
+    with two_panels("driver_traces", title, height_ratios=ratios) as (upper, lower):
+        for model, line in LINES.items():
+            columns = recorded(model, 92.0).columns
+            time, look = columns["time_s"], {"color": COLOURS[model], "lw": 1.3}
+            upper.plot(time, columns["model_torque_nm"], line, label=model, **look)
+            lower.plot(time, columns["angle_deg"], line, **look)
+        upper.set_ylabel("torque of the model (N·m)")
+        lower.set(xlabel="time (s)", ylabel="angle (deg)")
+
+
+def draw_measured() -> None:
     """Draw torque that was sent and measured, of the four models at one speed."""
     panels = tuple(
         measured_panel(measured(joint, stretch(60.0)), model)
         for model, joint in STANDARD_MODELS.items()
     )
-    shown = Drawn(FIGURES + "_stretch_figures:measured_figure", (panels,))
+    shown = Drawn(MATERIAL + "_stretch_figures:measured_figure", (panels,))
     files = draw(shown, stamp=SIMULATED, forms=("png",))
-    path.write_bytes(files["png"])
+    (FIGURES / "driver_measured.png").write_bytes(files["png"])
 
 
-def draw_backdrive(path: Path) -> None:
+def draw_backdrive() -> None:
     """Draw Fig. 8 anew: what the sensor measures of the device moved to and fro."""
-    figure = _figure(7.0, 3.1)
+    figure = plain_figure(7.0, 3.1)
     over_time, over_speed = figure.subplots(1, 2, width_ratios=(1.5, 1.0), sharey=True)
     looks = (
         (0.0, VERMILLION, 1.0, (1.28, 0.4, "without compensation")),
@@ -185,7 +184,7 @@ def draw_backdrive(path: Path) -> None:
         axes.set_title(letter, loc="left", weight="bold", fontsize=10)
     over_time.set_xlim(0.0, 3.4)
     figure.suptitle("SIMULATED DATA", x=0.995, ha="right", fontsize=8, color=VERMILLION)
-    figure.savefig(path)
+    figure.savefig(FIGURES / "driver_backdrive.png")
 
 
 def _draw_law(axes: Axes) -> None:
@@ -198,29 +197,25 @@ def _draw_law(axes: Axes) -> None:
     axes.text(-105.0, 0.42, "dashed: (7)\nat an even speed", fontsize=8.5, va="center")
 
 
-def draw_slip(path: Path) -> None:
+def draw_slip() -> None:
     """Draw how a lost grip in the catch of HM4 goes."""
-    figure = _figure(5.6, 4.6)
-    upper, lower = figure.subplots(2, sharex=True)
     held = recorded("HM4", 92.0).columns
     caught = held["time_s"][np.flatnonzero(held["phase"] == 1)[0]]
     slip_s = float(caught) + 0.03
     slipped = recorded("HM4", 92.0, slip_time=slip_s).columns
-    for columns, colour, line, label in (
-        (held, GREY, "--", "held"),
-        (slipped, BLUE, "-", "grip lost"),
-    ):
-        shown = (columns["time_s"] > slip_s - 0.1) & (columns["time_s"] < slip_s + 0.3)
-        ms = (columns["time_s"][shown] - slip_s) * 1e3
-        style = {"color": colour, "linestyle": line, "linewidth": 1.3}
-        upper.plot(ms, columns["command_torque_nm"][shown], label=label, **style)
-        lower.plot(ms, columns["velocity_deg_s"][shown], **style)
-    upper.set_ylabel("torque commanded (N·m)")
-    upper.legend(frameon=False, fontsize=8)
-    lower.set_ylabel("speed (deg/s)")
-    lower.set_xlabel("time after the hand lets go (ms)")
-    for axes in (upper, lower):
-        axes.axvline(0.0, color=GREY, linewidth=0.8)
-        axes.grid(color="#DDDDDD", linewidth=0.6)
-    figure.suptitle("HM4 at 92 deg/s, grip lost in the catch, simulated", fontsize=9)
-    figure.savefig(path)
+    title = "HM4 at 92 deg/s, grip lost in the catch, simulated"
+    with two_panels("driver_slip", title) as (upper, lower):
+        for columns, line, colour, label in (
+            (held, "--", GREY, "held"),
+            (slipped, "-", BLUE, "grip lost"),
+        ):
+            since_s = columns["time_s"] - slip_s
+            shown = (since_s > -0.1) & (since_s < 0.3)
+            ms, look = since_s[shown] * 1e3, {"color": colour, "lw": 1.3}
+            torque = columns["command_torque_nm"][shown]
+            upper.plot(ms, torque, line, label=label, **look)
+            lower.plot(ms, columns["velocity_deg_s"][shown], line, **look)
+        upper.set_ylabel("torque commanded (N·m)")
+        lower.set(xlabel="time after the hand lets go (ms)", ylabel="speed (deg/s)")
+        for axes in (upper, lower):
+            axes.axvline(0.0, color=GREY, linewidth=0.8)

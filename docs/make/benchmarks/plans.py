@@ -1,73 +1,55 @@
-"""A million simulated studies beside a loop over ``fleiss_kappa``.
+"""A million simulated studies beside a loop over ``fleiss_kappa``."""
 
-``python -m docs.make.benchmarks.plans`` writes its part of
-``docs/evidence/benchmarks.md``: Fleiss' kappa with its standard error in 1e6 studies of
-30 items by 5 raters, in one process, and by calling `fleiss_kappa` study by study on 2
-000 of them, in one run.
-"""
-
-import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from docs.make.evidence import write_tables
+from docs.make.benchmarks.rows import Benchmark, Row
 from masrel.agreement import fleiss_kappa
 from masrel.planning import Study
-from masrel.planning import _studies as masrel_studies
-from masrel.planning._truth import Design, design_of
+from masrel.planning._studies import simulated
+from masrel.planning._truth import design_of
 
-N_STUDIES, N_LOOPED = 1_000_000, 2_000
-
-
-def maker() -> Design:
-    """Return studies of 30 items by 5 raters, four categories."""
-    study = Study(
-        "fleiss_kappa",
-        value=0.5,
-        prevalences=(0.4, 0.3, 0.2, 0.1),
-        model="dirichlet-multinomial",
-        target="items",
-        n_items=30,
-        n_raters=5,
-        interval="t",
-    )
-    return design_of(study)
+STUDY = Study(
+    "fleiss_kappa",
+    value=0.5,
+    prevalences=(0.4, 0.3, 0.2, 0.1),
+    model="dirichlet-multinomial",
+    target="items",
+    n_items=30,
+    n_raters=5,
+    interval="t",
+)
 
 
-def simulated(n_studies: int) -> tuple[float, float]:
-    """Return seconds of the clock and of the processor."""
-    studies = maker()
-    clock, processor = time.perf_counter(), time.process_time()
-    masrel_studies.simulated(studies, np.random.default_rng(1), n_studies)
-    return time.perf_counter() - clock, time.process_time() - processor
-
-
-def looped(n_studies: int) -> tuple[float, float]:
-    """Return the same of one call a study, tables ready."""
-    studies = maker()
-    freq = np.random.default_rng(1).multinomial(30, studies.p, size=n_studies)
-    tables = [studies.rows.repeat(of_study, axis=0) for of_study in freq]
-    clock, processor = time.perf_counter(), time.process_time()
+def looped(tables: list[np.ndarray]) -> None:
+    """Call `fleiss_kappa` study by study, tables ready."""
     for table in tables:
         _ = fleiss_kappa(table, categories=range(4)).standard_error
-    return time.perf_counter() - clock, time.process_time() - processor
 
 
-def main() -> None:
-    """Write the part."""
-    first = looped(N_LOOPED)
-    clock, processor = simulated(N_STUDIES)
-    second = looped(N_LOOPED)
-    each = 0.5 * (first[1] + second[1]) / N_LOOPED
-    lines = [
-        "| how | clock | processor | a study |",
-        "|---|---|---|---|",
-        f"| whole studies in arrays | {clock:.1f} s | {processor:.1f} s "
-        f"| {1e6 * processor / N_STUDIES:.1f} µs |",
-        f"| a call a study | – | – | {1e6 * each:.0f} µs |",
-    ]
-    write_tables(["plans"], lines)
+def rows(quick: bool, _: Path) -> Iterator[Row]:
+    """Yield Fleiss' kappa with its standard error, study by study, in one process."""
+    n, n_looped = (10_000, 200) if quick else (1_000_000, 2_000)
+    design = design_of(STUDY)
+    freq = np.random.default_rng(1).multinomial(30, design.p, size=n_looped)
+    tables = [design.rows.repeat(of_study, axis=0) for of_study in freq]
+    yield Row(
+        what="a study of 30 items by 5 raters",
+        works={
+            "masrel, whole studies in arrays": lambda: simulated(
+                design, np.random.default_rng(1), n
+            ),
+            "masrel, a call a study": partial(looped, tables),
+        },
+        parts={
+            "masrel, whole studies in arrays": n,
+            "masrel, a call a study": n_looped,
+        },
+        turns=3,
+    )
 
 
-if __name__ == "__main__":
-    main()
+BENCHMARK = Benchmark(rows=rows)

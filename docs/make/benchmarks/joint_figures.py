@@ -1,12 +1,12 @@
 """The figures of docs/reference/elbow.md about run time and sampling."""
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from docs.make.benchmarks.rows import Result
+from docs.make.evidence import FIGURES
 from masrel.plots._style import (
     BLACK,
     BLUE,
@@ -16,11 +16,6 @@ from masrel.plots._style import (
     finished,
     house_style,
 )
-
-if TYPE_CHECKING:
-    from docs.make.benchmarks.elbow import Point
-
-FIGURES = Path(__file__).parents[2] / "figures"
 
 _WAYS = {
     "exact": ("exact: events and peak", BLUE, "*", 11),
@@ -32,23 +27,24 @@ _WAYS = {
 _LABELS = {"sampled": ((5, 5), "left"), "solve_ivp": ((-6, -8), "right")}
 
 
-def draw_work(points: Sequence["Point"]) -> None:
+def draw_work(lines: Sequence[Result]) -> None:
     """Error of the events against the time that finding them takes."""
     with house_style(parse_math=True):
         figure = Figure(figsize=(5.6, 3.6))
         axes = figure.subplots()
         for way, (label, colour, marker, size) in _WAYS.items():
-            of_way = [point for point in points if point.way == way]
-            x = [1e3 * point.seconds for point in of_way]
-            y = [max(point.error_s, 1e-17) for point in of_way]
+            of_way = [line for line in lines if line["program"].startswith(way)]
+            x = [1e3 * line["seconds"] for line in of_way]
+            y = [max(line["error, s"], 1e-17) for line in of_way]
             axes.loglog(x, y, marker=marker, color=colour, markersize=size, lw=0.8,
                         label=label)  # fmt: skip
             if way in _LABELS:
                 offset, side = _LABELS[way]
-                for point, at, height in zip(of_way, x, y, strict=True):
+                for line, *point in zip(of_way, x, y, strict=True):
                     axes.annotate(
-                        point.setting, (at, height), xytext=offset, fontsize=6.5,
+                        line["program"].partition(", ")[2], point, xytext=offset,
                         textcoords="offset points", color=colour, ha=side,
+                        fontsize=6.5,
                     )  # fmt: skip
         axes.set_xlabel("processor time of one stretch (ms)")
         axes.set_ylabel("largest error of catch\nand catch end (s)")

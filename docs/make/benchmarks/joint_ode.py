@@ -24,11 +24,8 @@ class Ode:
         motion: Motion,
         *,
         rtol: float,
-        max_step: float,
-        method: str = "DOP853",
     ) -> None:
-        self.joint, self.motion, self.method = joint, motion, method
-        self.rtol, self.max_step = rtol, max_step
+        self.joint, self.motion, self.rtol = joint, motion, rtol
         self.found: dict[str, float] = {}
         self.time, self.state = 0.0, np.array([motion.start, 0.0, 0.0])
         self.stretch()
@@ -55,8 +52,8 @@ class Ode:
 
         event.terminal, event.direction = True, 1.0  # type: ignore[attr-defined]
         done = solve_ivp(
-            slope, (self.time, self.motion.duration), self.state, method=self.method,
-            rtol=self.rtol, atol=0.1 * self.rtol, events=event, max_step=self.max_step,
+            slope, (self.time, self.motion.duration), self.state, method="RK45",
+            rtol=self.rtol, atol=0.1 * self.rtol, events=event,
         )  # fmt: skip
         self.time, self.state = float(done.t[-1]), done.y[:, -1]
         if done.t_events[0].size:
