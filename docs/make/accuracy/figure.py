@@ -4,16 +4,13 @@ import math
 import random
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from docs.make.accuracy import peers
-
-if TYPE_CHECKING:
-    from docs.make.accuracy.__main__ import Line, Off
+from docs.make.accuracy.numbers import QUANTITIES, Number
 
 # Okabe and Ito's colours, told apart also by those who do not see red or green
 LOOKS = {
@@ -27,49 +24,46 @@ PACKAGES = ("masrel", *peers.PACKAGES)
 _LEAST, _NONE = 1e-19, 1e8  # where exact numbers and missing ones are drawn
 
 
-def draw(lines: "Sequence[Line]", path: Path) -> None:
+def draw(numbers: Sequence[Number], path: Path) -> None:
     """Draw errors of values and of standard errors, one panel each."""
     mpl.rcParams.update({"font.size": 8, "savefig.dpi": 200, "svg.hashsalt": "masrel"})
     figure = Figure(figsize=(7.2, 4.6), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True)
-    groups = list(dict.fromkeys(line.case.group for line in lines))
-    for axes, title in ((left, "value"), (right, "standard error")):
+    panels = figure.subplots(1, 2, sharey=True)
+    groups = list(dict.fromkeys(of.case.group for of in numbers))
+    for axes, what in zip(panels, QUANTITIES, strict=True):
+        of_what = [of for of in numbers if of.what == what]
         for package in PACKAGES:
-            if package in lines[0].values:
-                _scatter(axes, lines, groups, package, title)
-        _frame(axes, title, len(groups))
-    left.set_yticks(range(len(groups)), groups)
-    left.invert_yaxis()
-    handles, labels = left.get_legend_handles_labels()
+            if shown := [of for of in of_what if of.package == package]:
+                _scatter(axes, shown, groups, package)
+        _frame(axes, what, len(groups))
+    panels[0].set_yticks(range(len(groups)), groups)
+    panels[0].invert_yaxis()
+    handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False)
     path.parent.mkdir(exist_ok=True)
     figure.savefig(path, metadata={"Software": None})
 
 
 def _scatter(
-    axes: Axes, lines: "Sequence[Line]", groups: list[str], package: str, title: str
+    axes: Axes, numbers: Sequence[Number], groups: list[str], package: str
 ) -> None:
     jitter = random.Random(package)  # the same in every run
     row = (PACKAGES.index(package) - 2) * 0.16
-    x, y = [], []
-    for line in lines:
-        off = line.off(title)[package]
-        if line.exact(title) is None:
-            continue
-        if off.is_offered and off.is_comparable and not off.is_unasked:
-            x.append(_place(off))
-            y.append(groups.index(line.case.group) + row + jitter.uniform(-0.05, 0.05))
+    shown = [of for of in numbers if of.counts and not of.is_unasked]
+    y = [
+        groups.index(of.case.group) + row + jitter.uniform(-0.05, 0.05) for of in shown
+    ]
     colour, marker = LOOKS[package]
     axes.scatter(
-        x, y, 9, color=colour, marker=marker, alpha=0.7, linewidths=0, label=package
-    )
+        [_place(of) for of in shown], y, 9, color=colour, marker=marker, alpha=0.7,
+        linewidths=0, label=package,
+    )  # fmt: skip
 
 
-def _place(off: "Off") -> float:
-    if off.note:
+def _place(of: Number) -> float:
+    if of.note:
         return _NONE
-    error = off.relative if off.absolute is None else off.absolute
-    return max(error, _LEAST)
+    return max(of.relative if of.absolute is None else of.absolute, _LEAST)
 
 
 def _frame(axes: Axes, title: str, n_groups: int) -> None:

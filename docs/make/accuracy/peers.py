@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -53,17 +52,6 @@ def ask(package: str, case: Case, name: str, weights: str) -> Answer:
 def offers_errors(package: str, name: str) -> bool:
     """Tell whether a package offers standard errors of a coefficient."""
     return package == "irrCAC" or (package, name) == ("statsmodels", "cohen_kappa")
-
-
-def installed(names: list[str]) -> dict[str, str]:
-    """Return the versions of those packages that there are."""
-    versions = {}
-    for name in names:
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return versions
 
 
 def _statsmodels(case: Case, name: str, weights: str) -> Answer:
