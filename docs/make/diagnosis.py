@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-FIGURE = Path(__file__).parents[1] / "figures" / "diagnosis.png"
+from docs.make.evidence import FIGURES
+
 CATEGORIES = ("mild", "some", "much")
 N_ITEMS = 200
 SEES = (0.65, 0.7, 0.6, 0.7, 0.3, 0.85, 0.85, 0.9)  # how often each sees what is there
@@ -38,4 +39,4 @@ def draw(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    draw(FIGURE)
+    draw(FIGURES / "diagnosis.png")

@@ -12,10 +12,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from playwright.sync_api import sync_playwright
 
+from docs.make.evidence import FIGURES
 from docs.make.pages import ROOT, read, run
 from tests.lab.serve.browser.conftest import CHROMIUM, FLAGS
 
-FIGURES = ROOT / "docs" / "figures"
 PAGE = ROOT / "docs" / "howto" / "gallery.md"
 SIZE = {"width": 1060, "height": 985}  # of the window, as wide as what is read
 

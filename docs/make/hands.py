@@ -5,17 +5,20 @@ hands take some minutes.
 """
 
 import sys
+from collections.abc import Mapping
+from dataclasses import replace
 from math import degrees, radians
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from docs.make.evidence import FIGURES
 from masrel.lab.hess import HandTraits
 from masrel.lab.recording import PHASES
 from masrel.plots._style import GREY, VERMILLION, finished, house_style
+from tests.lab.hess.rig import controls
 from tests.lab.hess.test_hands import (
     FREE_END_DEG,
     PRE_CATCH,
@@ -28,12 +31,12 @@ from tests.lab.hess.test_hands import (
     table,
 )
 
-FIGURE = Path(__file__).parents[1] / "figures" / "driver_hands.png"
+Columns = Mapping[str, np.ndarray]
 HANDS = {600.0: ("#0072B2", "-"), 60.0: ("#009E73", "--"), 12.0: ("#E69F00", "-.")}
 N_DRAWN = 200  # hands in the right half
 
 
-def draw(path: Path) -> None:
+def draw() -> None:
     """Draw speeds through a catch, and how much of a loose arm's loss is lost."""
     with house_style():
         figure = Figure(figsize=(7.2, 3.2))
@@ -41,7 +44,7 @@ def draw(path: Path) -> None:
         _draw_speeds(speeds)
         _draw_losses(losses)
         files = finished(figure, stamp="SIMULATED DATA", forms=("png",))
-    path.write_bytes(files["png"])
+    (FIGURES / "driver_hands.png").write_bytes(files["png"])
 
 
 def _draw_speeds(axes: Axes) -> None:
@@ -50,8 +53,14 @@ def _draw_speeds(axes: Axes) -> None:
         person = Person(
             traits=traits, model="HM4", mean_speed=radians(100.0), slips=0.0
         )
-        _draw_speed(axes, person, None, f"{stiffness:g} N·m/rad", colour, line)
-    _draw_speed(axes, person, 0.02, "lets go after 20 ms", VERMILLION, ":")
+        held = presented(person).recording.columns
+        catch_s = held["time_s"][np.argmax(held["phase"] == PHASES.index("catch"))]
+        look = {"color": colour, "linestyle": line, "label": f"{stiffness:g} N·m/rad"}
+        _draw_speed(axes, held, catch_s, look)
+    # the last of them
+    lost = presented(person, float(catch_s) + 0.02).recording.columns
+    look = {"color": VERMILLION, "linestyle": ":", "label": "lets go after 20 ms"}
+    _draw_speed(axes, lost, catch_s, look)
     axes.set(
         xlabel="time from the catch of HM4 (ms)",
         ylabel="speed (deg/s)",
@@ -63,24 +72,9 @@ def _draw_speeds(axes: Axes) -> None:
 
 
 def _draw_speed(
-    axes: Axes,
-    person: Person,
-    slips_s: float | None,
-    label: str,
-    colour: str,
-    line: str,
+    axes: Axes, columns: Columns, from_s: float, look: dict[str, str]
 ) -> None:
-    held = presented(person).recording.columns
-    catch_s = held["time_s"][np.argmax(held["phase"] == PHASES.index("catch"))]
-    if slips_s is not None:
-        held = presented(person, float(catch_s) + slips_s).recording.columns
-    axes.plot(
-        (held["time_s"] - catch_s) * 1e3,
-        held["velocity_deg_s"],
-        line,
-        color=colour,
-        label=label,
-    )
+    axes.plot((columns["time_s"] - from_s) * 1e3, columns["velocity_deg_s"], **look)
 
 
 def _draw_losses(axes: Axes) -> None:
@@ -92,7 +86,8 @@ def _draw_losses(axes: Axes) -> None:
         held.append(shares(columns)[counts].max())
         slip_s = slip_time(person, columns)
         # By so small an inertia no lost grip is ever noticed
-        slipped = presented(person, slip_s, loose_inertia=1e-3).recording.columns
+        deaf = controls(person.model, loose_inertia=1e-3)
+        slipped = presented(replace(person, model=deaf), slip_s).recording.columns
         after = (slipped["time_s"] > slip_s) & (slipped["time_s"] < slip_s + 0.02)
         loose.append(shares(slipped)[after].max())
     bins = np.linspace(0.0, 1.2, 49)
@@ -110,7 +105,7 @@ def _draw_losses(axes: Axes) -> None:
 
 if __name__ == "__main__":
     n_hands = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    draw(FIGURE)
+    draw()
     drawn = list(people(n_hands, seed=0))
     print(table([outcome(person) for person in tqdm(drawn)]))
     speeds = [degrees(person.mean_speed) for person in drawn]

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
+from docs.make.evidence import FIGURES
 from tests.lab.serve.browser.conftest import CHROMIUM, FLAGS
 from tests.lab.serve.browser.stages import Stage, make_study
-
-FIGURES = Path(__file__).parents[1] / "figures"
 
 
 def main() -> None:

@@ -4,12 +4,11 @@
 """
 
 import math
-from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
+from docs.make.benchmarks.figures import plain_figure
+from docs.make.evidence import FIGURES
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     Controller,
@@ -22,7 +21,6 @@ from masrel.lab.hess import (
 )
 from masrel.lab.recording import Recording
 
-FIGURE = Path(__file__).parents[1] / "figures" / "soft_ends.png"
 START = math.radians(30.0)
 
 SCENES = {  # title: model, where to, deg, how often, longest, s; from when behind, s
@@ -65,9 +63,7 @@ def sent(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> None:
     """Draw, and print what falls most."""
-    mpl.rcParams.update({"font.size": 9, "savefig.dpi": 200})
-    mpl.rcParams.update({"axes.spines.top": False, "axes.spines.right": False})
-    figure = Figure(figsize=(5.6, 7.2), layout="constrained")
+    figure = plain_figure(5.6, 7.2)
     panels = figure.subplots(len(SCENES))
     for axes, (title, scene) in zip(panels, SCENES.items(), strict=True):
         *shown, behind_s = scene
@@ -81,7 +77,7 @@ def main() -> None:
         axes.grid(color="#DDDDDD", linewidth=0.6)
         axes.legend(frameon=False, fontsize=8, loc="upper left")
     axes.set_xlabel("time (s)")
-    figure.savefig(FIGURE)
+    figure.savefig(FIGURES / "soft_ends.png")
 
 
 if __name__ == "__main__":

@@ -5,10 +5,10 @@
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
+from docs.make.evidence import FIGURES
 from docs.make.tone_figures import ToneLine, ToneView, draw
 from masrel.lab.elbow import Hold, Joined, MinimumJerk, Reversed
 from masrel.lab.elbow.tone import (
@@ -23,7 +23,6 @@ from masrel.lab.elbow.tone import (
 )
 from masrel.lab.hess import Rendering, render
 
-FIGURES = Path(__file__).parents[1] / "figures"
 START = math.radians(30.0)
 
 STRETCH_S, BACK_S = 1.6, 2.4

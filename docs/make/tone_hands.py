@@ -6,10 +6,10 @@ hundred hands of each kind take some ten minutes.
 
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from docs.make.evidence import FIGURES
 from masrel.lab.hess import HandTraits
 from masrel.plots._style import (
     BLUE,
@@ -28,10 +28,8 @@ from tests.lab.hess.test_tone_held import (
     row,
 )
 
-FIGURE = Path(__file__).parents[1] / "figures" / "tone_held.png"
 
-
-def draw(path: Path) -> None:
+def draw() -> None:
     """Draw angle and torque of one presentation of clonus."""
     (rater,) = raters("clonus", [5])
     soft = HandTraits(stiffness=40.0, damping=2.0)
@@ -52,12 +50,12 @@ def draw(path: Path) -> None:
         torque.set(ylabel="torque (N·m)", xlabel="time (s)", ylim=(0.0, None))
         figure.align_ylabels([angle, torque])
         files = finished(figure, stamp="SIMULATED DATA", forms=("png",))
-    path.write_bytes(files["png"])
+    (FIGURES / "tone_held.png").write_bytes(files["png"])
 
 
 if __name__ == "__main__":
     n_hands = int(sys.argv[1]) if len(sys.argv) > 1 else len(SEEDS)
-    draw(FIGURE)
+    draw()
     print(HEAD)
     for kind in KINDS if n_hands else ():
         print(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from masrel.lab.elbow import STANDARD_MODELS, JointModel
 from masrel.lab.hess import (
+    Controller,
     HandTraits,
     HumanHand,
     Presented,
@@ -154,7 +155,7 @@ class Person:
     """A hand, and what it does with it: one of the sampled ones."""
 
     traits: HandTraits
-    model: str
+    model: str | Controller
     mean_speed: float  # rad/s
     slips: float  # where among the samples it may be lost at, 0 to 1
 
@@ -183,13 +184,11 @@ def people(n_hands: int, seed: int) -> Iterator[Person]:
         )
 
 
-def presented(
-    person: Person, slip_time: float | None = None, **options: float
-) -> Presented:
+def presented(person: Person, slip_time: float | None = None) -> Presented:
     """Present the model to a hand."""
     way = {"start": START, "end": END, "mean_speed": person.mean_speed}
     hand = HumanHand(person.traits, slip_time=slip_time, **way)
-    return present(person.model, hand=hand, **options)
+    return present(person.model, hand=hand)
 
 
 def outcome(person: Person) -> Outcome:
