@@ -1,10 +1,11 @@
 """The page of the last run by hand of every slow and long test.
 
-``python -m docs.make.long_tests JUNIT_XML`` writes the table of tests on
-``docs/evidence/long_tests.md`` and the counts of injected faults;
-``python -m tests.mutants`` writes the table of deliberate faults.
+``python -m docs.make.long_tests JUNIT_XML`` writes the tests and the counts of
+injected faults beside ``docs/evidence/long_tests.md``; ``python -m tests.mutants``
+writes the deliberate faults.
 """
 
+import csv
 import subprocess
 import sys
 from collections import defaultdict
@@ -13,48 +14,51 @@ from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree
 
-PAGE = Path(__file__).parents[1] / "evidence" / "long_tests.md"
-RECORD = Path(__file__).parents[1] / "evidence" / "record.md"
-TESTS = "<!-- table of tests -->\n", "<!-- end of the tests -->\n"
-FAULTS = "<!-- counts of faults -->\n", "<!-- end of the counts -->\n"
-MUTANTS = "<!-- deliberate faults -->\n", "<!-- end of the deliberate faults -->\n"
+from docs.make.evidence import EVIDENCE, table, write_part, write_rows
+
+PAGE = EVIDENCE / "long_tests.md"
+DELIBERATE = EVIDENCE / "long_tests_deliberate.csv"
 
 
 def write_tests(junit: Path) -> None:
-    """Write when it was, of which commit, and a row a file of tests."""
+    """Write a row per file of tests; on the page, when it was and of which commit."""
     # The file is pytest's own, written a moment ago.
-    rows: dict[str, list[float]] = defaultdict(lambda: [0, 0, 0.0])
+    counts: dict[str, list[float]] = defaultdict(lambda: [0, 0, 0.0])
     for case in ElementTree.parse(junit).iter("testcase"):
-        row = rows[case.attrib["classname"]]
+        count = counts[case.attrib["classname"]]
         failed = case.find("failure") is not None or case.find("error") is not None
-        row[0 if not failed else 1] += case.find("skipped") is None
-        row[2] += float(case.attrib["time"])
-    lines = [
-        f"`.ci/long` {_when()}. Of a count that the docs name `.ci/run` holds a seeded "
-        "part; here it is whole.",
-        "",
-        "| tests | passed | failed | seconds |",
-        "|---|---|---|---|",
+        count[0 if not failed else 1] += case.find("skipped") is None
+        count[2] += float(case.attrib["time"])
+    head = ("passed", "failed", "seconds")
+    rows = [
+        {"tests": name, **dict(zip(head, map(round, count), strict=True))}
+        for name, count in sorted(counts.items())
     ]
-    for name, (passed, failed, seconds) in sorted(rows.items()):
-        lines.append(f"| `{name}` | {passed:g} | {failed:g} | {seconds:.0f} |")
-    _put(PAGE, TESTS, "\n".join(lines) + "\n")
+    write_rows("long_tests", rows)
+    passed, failed, seconds = (
+        round(sum(of)) for of in zip(*counts.values(), strict=True)
+    )
+    text = f"`.ci/long` ran {_when()}: {passed} passed, {failed} failed, {seconds} s."
+    write_part(PAGE, "tests", text)
 
 
 def write_faults(junit: Path) -> str:
-    """Write the counts of injected faults and return them."""
+    """Write the counts of injected faults and return them as a table."""
     counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
     for entry in ElementTree.parse(junit).iter("property"):
         if entry.attrib["name"] == "faults":
             kind, injected, survived = entry.attrib["value"].split("|")
             counts[kind][0] += int(injected)
             counts[kind][1] += int(survived)
-    lines = ["| fault | injected | survived |", "|---|---|---|"]
-    lines += [f"| {kind} | {n} | {m} |" for kind, (n, m) in sorted(counts.items())]
-    table = "\n".join(lines) + "\n"
-    when = f"`python -m tests.faults`, which `.ci/long` runs too, {_when()}:\n\n"
-    _put(PAGE, FAULTS, when + table)
-    return table
+    head = ("fault", "injected", "survived")
+    rows = [(kind, *count) for kind, count in sorted(counts.items())]
+    write_rows(
+        "long_tests_injected", [dict(zip(head, row, strict=True)) for row in rows]
+    )
+    survived, injected = (sum(row[k] for row in rows) for k in (2, 1))
+    text = f"`python -m tests.faults` ran {_when()}: {survived} of {injected} survived."
+    write_part(PAGE, "injected", text)
+    return table(head, rows) + "\n"
 
 
 def write_mutants(
@@ -64,32 +68,22 @@ def write_mutants(
 
     The rows of other faults of these names stay as they are.
     """
-    _, table, _ = _parts(PAGE, MUTANTS)
-    rows = {line.split(" | ")[0][2:]: line for line in table.splitlines()[4:]}
-    when = _when()
+    with DELIBERATE.open(encoding="utf-8", newline="") as file:
+        rows: dict[str, dict[str, object]] = {
+            r["fault"]: r for r in csv.DictReader(file)
+        }
     for name, (tests, result, seconds) in results.items():
-        rows[name] = f"| {name} | `{tests}` | {result} | {seconds:.0f} | {when} |"
-    lines = [rows[name] for name in names if name in rows]
-    killed = f"{sum(' | killed | ' in line for line in lines)} of {len(names)} killed."
-    head = [
-        "| fault | tests | result | processor time, s | run |",
-        "|---|---|---|---|---|",
-    ]
-    _put(PAGE, MUTANTS, "\n".join([killed, "", *head, *lines]) + "\n")
-    return killed
-
-
-def _parts(file: Path, marks: tuple[str, str]) -> tuple[str, str, str]:
-    """Split a page into what stands before the marks, between them, and after."""
-    before, _, rest = file.read_text(encoding="utf-8").partition(marks[0])
-    between, _, after = rest.partition(marks[1])
-    return before, between, after
-
-
-def _put(file: Path, marks: tuple[str, str], text: str) -> None:
-    before, _, after = _parts(file, marks)
-    page = f"{before}{marks[0]}{text}{marks[1]}{after}"
-    file.write_text(page, encoding="utf-8")
+        rows[name] = {"fault": name, "tests": tests, "result": result}
+        rows[name] |= {"seconds": round(seconds), "run": _when()}
+    kept = [rows[name] for name in names if name in rows]
+    write_rows(DELIBERATE.stem, kept)
+    n_killed, n_left = (
+        sum(r["result"] == "killed" for r in kept),
+        len(names) - len(kept),
+    )
+    text = f"{n_killed} of {len(names)} killed, {n_left} not run since they were added."
+    write_part(PAGE, "deliberate", text)
+    return text
 
 
 def _when() -> str:

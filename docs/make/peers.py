@@ -1,9 +1,9 @@
 """The page of other programs: ``python -m docs.make.peers``, of `.ci/long`.
 
-Writes ``docs/evidence/peers.md``: ten files through masrel, Python's irrCAC,
-krippendorff, pingouin, statsmodels and scikit-learn (the extra `peers`) and R's psych,
-vcd and lme4 (`peers.R`, where R is there), value by value. A difference that nothing
-here explains ends the program; an explanation of nothing is left out.
+Writes ``docs/evidence/peers.md`` and its rows: ten files through masrel, Python's
+irrCAC, krippendorff, pingouin, statsmodels and scikit-learn (the extra `peers`) and
+R's psych, vcd and lme4 (`peers.R`, if R is installed), value by value. A difference
+that nothing here explains ends the program; an explanation of nothing is left out.
 """
 
 import contextlib
@@ -25,10 +25,12 @@ import numpy as np
 import pandas as pd
 
 import masrel
+from docs.make.evidence import EVIDENCE, table, write_rows
 from masrel.agreement import COEFFICIENTS
 
 DOCS = Path(__file__).parents[1]
-PAGE = DOCS / "evidence" / "peers.md"
+PAGE, ROWS = EVIDENCE / "peers.md", EVIDENCE / "peers.csv"
+HEAD = ("file", "ratings", "numbers compared", "equal")
 ORACLES = DOCS.parent / "tests" / "oracles" / "agreement.json"
 R_PROGRAM = Path(__file__).with_suffix(".R")
 QUANTITIES = {"value": "", "error": ", SE", "low": ", low", "high": ", high"}
@@ -166,7 +168,7 @@ def files() -> list[File]:
         from_oracles(
             "trap_two_raters_unused_middle",
             "unused.csv",
-            "Two raters of ten items on grades 1 to 5, of which nobody gave 3",
+            "Two raters of ten items on grades 1 to 5; nobody gave 3",
             *named("cohen_kappa", "brennan_prediger"),
             *named("cohen_kappa", weights="linear"),
             *named("cohen_kappa", weights="quadratic"),
@@ -200,7 +202,7 @@ def files() -> list[File]:
         from_oracles(
             "deg_one_category_declared2",
             "one.csv",
-            "Three raters of five items, every grade the same of two declared",
+            "Three raters of five items; two grades declared, one given",
             *named(*ALIKE, "krippendorff_alpha"),
         ),
         SHROUT_FLEISS,
@@ -416,51 +418,51 @@ DIFFERENCES = (
         coefficients=("fleiss_kappa", "krippendorff_alpha"),
         quantities=("value",),
         files=("one.csv",),
-        why="All ratings are alike, which is 0/0: ours is undefined, with the reason; "
-        "irrCAC stops with Python's ZeroDivisionError.",
+        why="All ratings are alike, which is 0/0: masrel's value is undefined, with "
+        "the reason; irrCAC stops with Python's ZeroDivisionError.",
     ),
     Difference(
         program="irrCAC",
         quantities=ENDS,
         files=("one.csv",),
-        why="An error of 0 makes an interval without a width; ours is undefined, and "
-        "says that no item differs from another.",
+        why="An error of 0 gives an interval without width; masrel's is undefined, "
+        "with the reason that no item differs from another.",
     ),
     Difference(
         program="irrCAC",
         coefficients=("krippendorff_alpha",),
         quantities=("error", *ENDS),
         convention="irrcac",
-        why="irrCAC's error of α leaves out that the correction for few ratings varies "
-        "with the sample, too: of complete ratings it is that of Fleiss' κ.",
+        why="irrCAC's error of α treats the correction for few ratings as fixed. With "
+        "complete ratings it equals the error of Fleiss' κ.",
     ),
     Difference(
         program="irrCAC",
         quantities=("error", *ENDS),
         files=GAPS,
         convention="irrcac",
-        why="In irrCAC's error an item of one rating counts as disagreement, and its t "
-        "counts it as an item; ours is the delta method of items with a pair.",
+        why="irrCAC's error counts an item with one rating as disagreement, and its t "
+        "counts it as an item; masrel's uses items with a pair.",
     ),
     Difference(
         program="krippendorff",
         files=("one.csv",),
         why="All ratings are alike, which is 0/0: krippendorff stops with Python's "
-        "ValueError, as there is a single value in its data.",
+        "ValueError, since its data have a single value.",
     ),
     Difference(
         program="statsmodels",
         coefficients=("cohen_kappa",),
         quantities=("error", *ENDS),
         convention="over_n",
-        why="statsmodels' error is over n, and its interval of the normal law; ours is "
-        "over n − 1, with t of as many degrees.",
+        why="statsmodels divides the variance by n and uses the normal distribution; "
+        "masrel divides by n − 1 and uses t.",
     ),
     Difference(
         program="vcd",
         quantities=("error", *ENDS),
         convention="over_n",
-        why="vcd's error is over n, and its interval of the normal law.",
+        why="vcd divides the variance by n and uses the normal distribution.",
     ),
     Difference(
         program="psych",
@@ -468,39 +470,40 @@ DIFFERENCES = (
         quantities=ENDS,
         weights=("identity",),
         convention="over_n",
-        why="psych's interval of κ has an error over n, and the normal law.",
+        why="psych divides the variance of κ by n and uses the normal distribution.",
     ),
     Difference(
         program="psych",
         coefficients=("cohen_kappa",),
         quantities=ENDS,
         weights=("linear", "quadratic"),
-        why="psych's variance of weighted κ has rows and columns exchanged; in "
-        "`unused.csv` it comes out as 0.",
+        why="psych's variance of weighted κ has rows and columns exchanged; for "
+        "`unused.csv` it is 0.",
     ),
     Difference(
         program="statsmodels",
         coefficients=("fleiss_kappa", "brennan_prediger"),
         files=GAPS,
-        why="`aggregate_raters` makes missing ratings one more category.",
+        why="`aggregate_raters` counts missing ratings as one more category.",
     ),
     Difference(
         program="statsmodels",
         coefficients=("brennan_prediger",),
         files=("unused.csv", "one.csv"),
-        why="`aggregate_raters` knows the grades that were given, ours those declared.",
+        why="`aggregate_raters` uses the grades that were given; masrel uses those "
+        "declared.",
     ),
     Difference(
         program="scikit-learn",
         files=("unused.csv",),
-        why="scikit-learn weighs by the place among the grades given: 2 and 4 are "
-        "neighbours where nobody gave 3, unless `labels` has all of them.",
+        why="scikit-learn weighs by the position among the grades given: if nobody "
+        "gave 3, 2 and 4 are neighbours, unless `labels` lists all grades.",
     ),
     Difference(
         program="pingouin",
         files=("shrout_fleiss_gaps.csv",),
         why='`nan_policy="omit"` leaves out every item with a gap, here three of six; '
-        "ours is of all measurements, by REML.",
+        "masrel uses all measurements, by REML.",
     ),
     Difference(
         program="psych",
@@ -513,15 +516,15 @@ DIFFERENCES = (
         coefficients=("icc_1", "icc_1k"),
         quantities=("value",),
         files=("shrout_fleiss_gaps.csv",),
-        why="psych makes the one-way ICC of the variances of the two-way model; lme4's "
-        "one-way model has ours.",
+        why="psych computes the one-way ICC from the variances of the two-way model; "
+        "lme4's one-way model agrees with masrel.",
     ),
     Difference(
         program="psych",
         quantities=ENDS,
         files=("shrout_fleiss_gaps.csv",),
-        why="psych's intervals take the table for a complete one; ours are of the "
-        "profile likelihood of what was measured.",
+        why="psych's intervals treat the table as complete; masrel's use the profile "
+        "likelihood of what was measured.",
     ),
 )
 
@@ -601,9 +604,10 @@ def compared(
     return comparisons
 
 
-def table(comparisons: list[Comparison], whys: list[Difference]) -> list[str]:
-    """Return the table of a file; explanations are numbered as they are met."""
-    lines = ["| | masrel | the same | another number |", "|---|---|---|---|"]
+def rows_of(
+    comparisons: list[Comparison], whys: list[Difference]
+) -> Iterator[dict[str, str]]:
+    """Yield the rows of a file; explanations are numbered as they are met."""
     rows: dict[tuple[Question, str], list[Comparison]] = {}
     for of in comparisons:
         rows.setdefault((of.question, of.quantity), []).append(of)
@@ -613,16 +617,18 @@ def table(comparisons: list[Comparison], whys: list[Difference]) -> list[str]:
             if of.why is not None:
                 whys += [of.why] * (of.why not in whys)
                 number = whys.index(of.why) + 1
-                others.append(f"{of.program} {digits(of.other)} [({number})](#why)")
-        title = f"{question.title}{QUANTITIES[quantity]}"
-        same = ", ".join(of.program for of in row if of.why is None)
-        cells = [title, digits(row[0].own), same, "; ".join(others)]
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
+                others.append(f"{of.program} {digits(of.other)} ({number})")
+        yield {
+            "file": row[0].file,
+            "number": f"{question.title}{QUANTITIES[quantity]}",
+            "masrel": digits(row[0].own),
+            "equal": ", ".join(of.program for of in row if of.why is None),
+            "other (reason)": "; ".join(others),
+        }
 
 
 def opening(comparisons: list[Comparison], versions: Mapping[str, str]) -> list[str]:
-    """Return what stands above the tables."""
+    """Return what stands above the table of files."""
     whys = [of.why for of in comparisons if of.why is not None]
     n_again = sum(why.convention is not None for why in whys)
     absent = [name for name in (*PROGRAMS, *OF_R) if name not in versions]
@@ -634,18 +640,18 @@ def opening(comparisons: list[Comparison], versions: Mapping[str, str]) -> list[
         "interval, as far as they have them, by the call that a reader would write."
         + f" Not there, and in no table: {', '.join(absent)}."
         * bool(absent)
-        + f" {command} of `.ci/long` writes this page, and stops at a difference "
+        + f" {command} in `.ci/long` writes this page, and stops at a difference "
         "without a reason.",
-        f"Of {len(comparisons)} numbers of other programs "
-        f"{len(comparisons) - len(whys)} are ours, but for the last digits of floats, "
+        f"Of {len(comparisons)} numbers of other programs, "
+        f"{len(comparisons) - len(whys)} equal ours: to the last digits of floats, "
         "or as far as they are computed (psych and lme4 by steps, 5 · 10⁻⁶) or printed "
-        f"(pingouin's ends, two decimals). {n_again} are had again by "
-        "[`--convention`](../howto/old_numbers.md), which is "
-        "checked; the others are explained [below](#why).",
-        'masrel\'s are those of `masrel.agree(file, target="items")` with the declared '
-        'categories and `Estimating(interval="analytic")`, whose t is also irrCAC\'s; '
-        "ICC has the interval of its form. What masrel chooses by itself is [another "
-        "interval](../explanation/intervals.md), and often a better one.",
+        f"(pingouin's ends, two decimals). {n_again} are reproduced by "
+        "[`--convention`](../howto/old_numbers.md), which is checked. The others are "
+        f"explained [below](#why). Every number is in [{ROWS.name}]({ROWS.name}).",
+        'masrel\'s numbers are those of `masrel.agree(file, target="items")` with the '
+        'declared categories and `Estimating(interval="analytic")`, whose t is also '
+        "irrCAC's; ICC has the interval of its form. Without these options masrel "
+        "chooses [another interval](../explanation/intervals.md), often a better one.",
     )
     title = "# The same files through other programs"
     return [
@@ -656,13 +662,13 @@ def opening(comparisons: list[Comparison], versions: Mapping[str, str]) -> list[
 
 
 def closing(whys: list[Difference]) -> list[str]:
-    """Return why numbers are others."""
+    """Return why numbers differ."""
     return [
         "## Why",
         "",
         *(
             f"{number}. {of.why}"
-            + f" `--convention {of.convention}` has theirs." * bool(of.convention)
+            + f" `--convention {of.convention}` reproduces it." * bool(of.convention)
             for number, of in enumerate(whys, 1)
         ),
     ]
@@ -679,7 +685,8 @@ def installed() -> dict[str, str]:
 
 def main() -> None:
     """Run all programs, and write the page."""
-    lines, whys, every = list[str](), list[Difference](), list[Comparison]()
+    lines, shown, rows = list[tuple[object, ...]](), list[str](), list[dict[str, str]]()
+    whys, every = list[Difference](), list[Comparison]()
     versions, has_r = installed(), shutil.which("Rscript") is not None
     with tempfile.TemporaryDirectory() as folder:
         for file in files():
@@ -689,12 +696,16 @@ def main() -> None:
             theirs += by_r(file, Path(folder), versions) if has_r else []
             comparisons = compared(file, path, theirs)
             every += comparisons
-            lines += [f"## {file.name}", "", f"{file.about}.", ""]
-            lines += [*table(comparisons, whys), ""]
+            rows += rows_of(comparisons, whys)
+            n_equal = sum(of.why is None for of in comparisons)
+            lines.append((f"`{file.name}`", file.about, len(comparisons), n_equal))
             if len(file.rows) <= SHOWN:
-                lines += ["```text", *file.csv.splitlines(), "```", ""]
-    page = "\n".join([*opening(every, versions), *lines, *closing(whys)])
-    PAGE.write_text(f"{page}\n", encoding="utf-8")
+                shown += [f"`{file.name}`", "", "```text", *file.csv.splitlines()]
+                shown += ["```", ""]
+    write_rows(ROWS.stem, rows)
+    page = [*opening(every, versions), table(HEAD, lines, n_text=2), ""]
+    page += [*closing(whys), "", "## The small files", "", *shown]
+    PAGE.write_text("\n".join(page), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 """Forgeries of a whole record and of a sealed one: what is found, and what is not.
 
-``python -m tests.lab.flow.test_forgeries`` writes the table into
+``python -m tests.lab.flow.test_forgeries`` writes the rows beside
 ``docs/evidence/record.md``.
 """
 
+import csv
 import hashlib
 import json
 import shlex
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.make.long_tests import RECORD, _parts, _put
+from docs.make.evidence import EVIDENCE, table, with_part, write_part, write_rows
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.verification import (
     anchor_findings,
@@ -36,7 +37,7 @@ from tests.lab.flow.test_verify import (
     without_line,
 )
 
-MARKS = "<!-- forgeries -->\n", "<!-- end of the forgeries -->\n"
+PAGE, ROWS = EVIDENCE / "record.md", "record_forgeries"
 R1, R2, R3 = (f"sessions/test_{rater}.jsonl" for rater in ("R1", "R2", "R3"))
 CONDUCT, TABLE, ANALYSIS = "conduct.jsonl", "ratings/ratings.csv", "analysis.json"
 RATERS, SCHEDULE, SEALED = "ratings/raters.csv", "schedules/test_R1.csv", "../sealed"
@@ -611,24 +612,32 @@ def test_a_forgery_is_found_or_said_not_to_be(
     assert outcome(set().union(*with_and_without), known) == anchored, what
 
 
-def table() -> str:
-    """The forgeries as the page shows them."""
-    rows = [
-        f"| {what} | {alone} | {anchored} |"
+def rows() -> list[dict[str, str]]:
+    """The forgeries as the file beside the page has them."""
+    head = ("forgery", "without an anchor", "with one from before")
+    return [
+        dict(zip(head, (what, alone, anchored), strict=True))
         for what, _, _, alone, anchored in FORGERIES
     ]
-    n = [Counter(each[place] for each in FORGERIES) for place in (3, 4)]
-    counts = " | ".join(
-        ", ".join(f"{of[key]} {key}" for key in (FOUND, DOUBT, STALE, NO) if of[key])
-        for of in n
-    )
-    head = ["| forgery | without an anchor | with one from before |", "|---|---|---|"]
-    return "\n".join([*head, *rows, f"| **of {len(FORGERIES)}** | {counts} |", ""])
 
 
-def test_the_page_has_the_table() -> None:
-    assert _parts(RECORD, MARKS)[1] == table()
+def summary() -> str:
+    """How many were found, as the page shows it."""
+    kinds = (FOUND, DOUBT, STALE, NO)
+    counts = []
+    for key in list(rows()[0])[1:]:
+        count = Counter(row[key] for row in rows())
+        counts.append([key, *(count[kind] for kind in kinds)])
+    return table([f"of {len(FORGERIES)}", *kinds], counts)
+
+
+def test_the_page_and_its_file_have_what_was_found() -> None:
+    with (EVIDENCE / f"{ROWS}.csv").open(encoding="utf-8") as file:
+        assert list(csv.DictReader(file)) == rows()
+    text = PAGE.read_text(encoding="utf-8")
+    assert with_part(text, "forgeries", summary()) == text
 
 
 if __name__ == "__main__":
-    _put(RECORD, MARKS, table())
+    write_rows(ROWS, rows())
+    write_part(PAGE, "forgeries", summary())
