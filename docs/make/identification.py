@@ -2,8 +2,8 @@
 
 python -m docs.make.identification figures
 python -m docs.make.identification coverage [STUDIES]
-python -m docs.make.identification wrong [STUDIES]
-python -m docs.make.identification right [STUDIES]
+python -m docs.make.identification wrong [STUDIES [TERM...]]
+python -m docs.make.identification right [STUDIES [CASE...]]
 python -m docs.make.identification time
 """
 
@@ -13,6 +13,7 @@ import statistics
 import sys
 import time
 from collections import Counter
+from contextlib import nullcontext
 from pathlib import Path
 
 from tqdm import tqdm
@@ -68,15 +69,23 @@ def coverage(n_studies: int) -> None:
         print(f"| {model}, {scatter} |", " | ".join(shares), "|")
 
 
-def wrong(n_studies: int) -> None:
-    """Write what 95 % intervals hold without and with what an arm has."""
+def wrong(n_studies: int, *names: str) -> None:
+    """Write what 95 % intervals hold without and with what an arm has.
+
+    Of some of it alone, print that.
+    """
     head = ["term", "catches", "fitted", "announced", *SYMBOLS]
-    with TERMS_TABLE.open("w", encoding="utf-8", newline="") as file:
+    place = (
+        TERMS_TABLE.open("w", encoding="utf-8", newline="")
+        if not names
+        else nullcontext(sys.stdout)
+    )
+    with place as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(head)
         for scatter in (None, SCATTER):
-            for name, arm in tqdm(WRONG.items()):
-                case = {"arm": arm, "scatter": scatter}
+            for name in tqdm(names or WRONG):
+                case = {"arm": WRONG[name], "scatter": scatter}
                 for options in ({}, {TERMS[name]: "fitted"}):
                     total = counts(case, range(5000, 5000 + n_studies), **options)
                     kind = "scattered" if scatter else "exact"
@@ -85,9 +94,9 @@ def wrong(n_studies: int) -> None:
                     table.writerow([*row, *(total[parameter] for parameter in NAMES)])
 
 
-def right(n_studies: int) -> None:
+def right(n_studies: int, *cases: str) -> None:
     """Print how often the right law is called wrong, or left without evidence."""
-    for case in RIGHT:
+    for case in cases or RIGHT:
         made = (quiet_fit(recordings(case, 7000 + i)) for i in range(n_studies))
         verdicts = Counter(each.lack_of_fit.verdict for each in made)
         alarms = verdicts["does not fit"], verdicts["no evidence either way"]
@@ -117,7 +126,8 @@ if __name__ == "__main__":
         coverage(int(sys.argv[2]) if len(sys.argv) > 2 else 200)
     elif what in (["wrong"], ["right"]):
         study_of = {"wrong": (wrong, 40), "right": (right, 400)}[what[0]]
-        study_of[0](int(sys.argv[2]) if len(sys.argv) > 2 else study_of[1])
+        n_studies = int(sys.argv[2]) if len(sys.argv) > 2 else study_of[1]
+        study_of[0](n_studies, *sys.argv[3:])
     elif what == ["time"]:
         seconds()
     else:

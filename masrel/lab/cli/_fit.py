@@ -25,8 +25,11 @@ if TYPE_CHECKING:
         ComparedFit,
         ElbowFit,
         FrictionFit,
+        LawComparison,
         Movement,
     )
+
+    _Results = tuple[ElbowFit | None, tuple[ComparedFit, ...], LawComparison | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +149,7 @@ def friction(
     with warnings_as_notes():
         movements = recordings.read(of_device=True, quiet=output.quiet)
         fitted = fit_friction(movements, level=level)
-    _write(fitted, (), folder, output)
+    _write(fitted, (), None, folder, output)
 
 
 @click.command("fit", cls=GroupedHelp)
@@ -204,6 +207,11 @@ def friction(
     help="Also fit with each further term of the arm, and compare by leaving trials "
     "out.",
 )
+@click.option(
+    "--laws",
+    metavar="all|NAME,...",
+    help="Also fit these laws of tone, and compare all laws by leaving recordings out.",
+)
 @_level
 @_figures
 @_output
@@ -211,6 +219,7 @@ def fit(
     recordings: _Recordings,
     model_file: Path | None,
     compare: bool,
+    laws: str | None,
     level: float,
     folder: Path | None,
     output: OutputOptions,
@@ -229,42 +238,63 @@ def fit(
         raise ParameterError(
             f"--slow-below: needs more than 0 deg/s and finite, got {slow_below:g}"
         )
+    if compare and laws is not None:
+        raise ParameterError(
+            "--compare, --laws: one compares terms of the arm, the other laws; needs "
+            "one of them, got both"
+        )
     with warnings_as_notes():
         movements = recordings.read(of_device=False, quiet=output.quiet)
-        fitted, compared = _fit_joint(movements, of_joint, level, compare)
-    _write(fitted, compared, folder, output)
+        results = _fit_joint(movements, _options(of_joint, level), compare, laws)
+    _write(*results, folder, output)
     if model_file is not None:
-        _write_model(fitted, model_file)
+        _write_model(results[0], model_file)
 
 
-def _fit_joint(
-    movements: "list[Movement]", of_joint: "dict[str, Any]", level: float, compare: bool
-) -> "tuple[ElbowFit, tuple[ComparedFit, ...]]":
+def _options(of_joint: "dict[str, Any]", level: float) -> "dict[str, Any]":
+    # as `identification.fit` takes them
     from dataclasses import replace
 
-    from masrel.lab.elbow import STANDARD_MODELS, identification
+    from masrel.lab.elbow import STANDARD_MODELS
 
     post_catch = of_joint.pop("post_catch")
     slow_below = of_joint.pop("slow_below")
-    options = {
+    return {
         **of_joint,
         "gravity_angle": math.radians(of_joint["gravity_angle"]),
         "constants": replace(STANDARD_MODELS["HM1"], post_catch=post_catch),
         "slow_below": None if slow_below is None else math.radians(slow_below),
         "level": level,
     }
+
+
+def _fit_joint(
+    movements: "list[Movement]",
+    options: "dict[str, Any]",
+    compare: bool,
+    laws: str | None,
+) -> "_Results":
+    # the elbow's fit, which is None where only other laws can be fitted, and what it
+    # is compared with
+    from masrel.lab.elbow import identification
+
+    if laws is not None:
+        names = None if laws == "all" else laws.split(",")
+        compared_laws = identification.compare_laws(movements, laws=names, **options)
+        return compared_laws.elbow, (), compared_laws
     if not compare:
-        return identification.fit(movements, **options), ()
+        return identification.fit(movements, **options), (), None
     compared = identification.compare_fits(movements, **options)
     first = compared[0].fit
     if first is None:  # refused, which was said
         raise ParameterError("--compare: there is no fit to compare with")
-    return first, compared
+    return first, compared, None
 
 
 def _write(
-    fitted: "ElbowFit | FrictionFit",
+    fitted: "ElbowFit | FrictionFit | None",
     compared: "tuple[ComparedFit, ...]",
+    laws: "LawComparison | None",
     folder: Path | None,
     output: OutputOptions,
 ) -> None:
@@ -274,26 +304,38 @@ def _write(
         fit_document,
         fit_figures,
         fit_table,
+        law_document,
+        law_tables,
         residual_tables,
     )
 
-    if folder is not None:
+    of_fit = [] if fitted is None else [fit_table(fitted), *residual_tables(fitted)]
+    first, *more = [*of_fit, *comparison_tables(compared), *law_tables(laws)]
+    if folder is not None and fitted is not None:
         for name, forms in fit_figures(fitted).items():
             for form, picture in forms.items():
                 write_file(folder / f"{name}.{form}", picture)
         click.echo(f"figures: {folder}", err=True)
     write_output(
         output,
-        document=lambda: fit_document(fitted) | comparison_document(compared),
-        text=lambda: fit_table(fitted),
-        more=(*residual_tables(fitted), *comparison_tables(compared)),
+        document=lambda: (
+            ({} if fitted is None else fit_document(fitted))
+            | comparison_document(compared)
+            | law_document(laws)
+        ),
+        text=lambda: first,
+        more=more,
     )
 
 
-def _write_model(fitted: "ElbowFit", path: Path) -> None:
+def _write_model(fitted: "ElbowFit | None", path: Path) -> None:
     import masrel
     from masrel.lab.elbow._model_file import as_toml, model_document
 
+    if fitted is None:
+        raise ParameterError(
+            "--output: a model file needs a fit of the elbow's law, which was refused"
+        )
     document = model_document(
         fitted.joint(),
         simulated=fitted.simulated,

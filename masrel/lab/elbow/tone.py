@@ -216,13 +216,11 @@ class LeadPipe(ToneModel):
             bent = min(max(moved, -limit), limit)
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
-        bent, limit = np.zeros(times.size), self.bristle_travel
-        for part, before in self._bends(motion):
-            mine = times >= part.start
-            until = np.minimum(times[mine], part.end)
-            travel = part.angle_at(until) - part.angle[0]
-            bent[mine] = np.clip(before + travel, -limit, limit)
-        return [bent]
+        limit, parts = self.bristle_travel, list(self._bends(motion))
+        starts = [part.start for part, _ in parts]
+        which = np.searchsorted(starts, times, side="right") - 1
+        before = np.array([bent - part.angle[0] for part, bent in parts])
+        return [np.clip(before[which] + motion.angle(times), -limit, limit)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

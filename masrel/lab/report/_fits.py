@@ -4,15 +4,24 @@ import math
 from collections.abc import Sequence
 
 from masrel.lab.analysis._results import as_plain
-from masrel.lab.elbow._model_file import ALL_QUANTITIES, Quantity
+from masrel.lab.elbow._model_file import (
+    ALL_QUANTITIES,
+    ARM_QUANTITIES,
+    DEGREES,
+    Quantity,
+)
 from masrel.lab.elbow.identification import (
     ComparedFit,
     ElbowFit,
     FittedParameter,
     FrictionFit,
     LackOfFit,
+    LawComparison,
+    LawFit,
 )
 from masrel.lab.elbow.identification._catches import Trial
+from masrel.lab.elbow.identification._laws import LAWS
+from masrel.lab.protocol._kinds import keys_of
 from masrel.plots._drawn_values import Drawn, Form
 from masrel.tables._tables import (
     ABSENT,
@@ -48,6 +57,7 @@ def fit_table(fit: ElbowFit | FrictionFit) -> Table:
             f"Slow trials differ from (1) by {error} of their mean torque; all trials "
             f"from the law by {number(fit.torque_sd, 3)} N·m (standard deviation).",
             "The column of a step takes what earlier steps found as known.",
+            "--laws all compares this law with laws of tone.",
             *fit.remarks,
         )
     else:
@@ -191,6 +201,83 @@ def comparison_document(compared: Sequence[ComparedFit]) -> dict[str, object]:
             ]
         )
     }
+
+
+def law_tables(laws: LawComparison | None) -> tuple[Table, ...]:
+    """Return the table of laws that were fitted to the same recordings, if any."""
+    if laws is None:
+        return ()
+    columns = (
+        Column(key="law", heading="Law", align="left"),
+        Column(key="n_parameters", heading="Parameters"),
+        Column(key="rms", heading="Left (N·m)"),
+        Column(key="error", heading="Error (N·m)"),
+        Column(key="worse", heading="Worse (10⁻³ N²·m²)"),
+        Column(key="worse_se", heading="SE"),
+    )
+    rows = tuple(
+        (
+            each.name,
+            each.n_parameters or ABSENT,
+            *(
+                ABSENT if math.isnan(value) else number(value, 3)
+                for value in (each.rms, each.error, 1e3 * worse, 1e3 * error)
+            ),
+        )
+        for each, worse, error in zip(laws.fits, laws.worse, laws.worse_se, strict=True)
+    )
+    notes = (
+        laws.sentence,
+        f"{len(laws.recordings)} recordings, which weigh the same; beside its "
+        "parameters each law has a constant of its own in each.",
+        "Left: root mean square of the torque after the fit. Error: of the torque of a "
+        "recording predicted from all others.",
+        "Worse: mean square error less that of the best law, with its standard error "
+        "over recordings.",
+        *(f"{each.name}: {each.reason}" for each in laws.fits if each.reason),
+    )
+    return (
+        Table(
+            name="laws",
+            caption="Laws compared by leaving recordings out",
+            columns=columns,
+            rows=rows,
+            notes=notes,
+            data="simulated" if laws.simulated else "recorded",
+        ),
+    )
+
+
+def law_document(laws: LawComparison | None) -> dict[str, object]:
+    """Return such a comparison as plain values for JSON; empty without one."""
+    if laws is None:
+        return {}
+    rows = [
+        {
+            "law": each.name,
+            "n_parameters": each.n_parameters,
+            "rms_nm": each.rms,
+            "error_nm": each.error,
+            "worse_nm2": float(worse),
+            "worse_se_nm2": float(error),
+            "chosen": each.name == laws.chosen,
+            "reason": each.reason,
+            "estimates": [_estimate(e, _law_quantity(each, e)) for e in each.estimates],
+        }
+        for each, worse, error in zip(laws.fits, laws.worse, laws.worse_se, strict=True)
+    ]
+    return {"laws": as_plain(rows), "laws_sentence": laws.sentence}
+
+
+def _law_quantity(fit: LawFit, estimate: FittedParameter) -> Quantity:
+    # the key is that of [models.parameters] in a protocol
+    if estimate.name in ALL_QUANTITIES and fit.name not in LAWS:
+        return ALL_QUANTITIES[estimate.name]
+    if estimate.name in ARM_QUANTITIES:
+        return ARM_QUANTITIES[estimate.name]
+    keys = keys_of(LAWS[fit.name].law.kind).items()
+    key, known = next((k, v) for k, v in keys if v.parameter == estimate.name)
+    return Quantity(estimate.name, key, "", DEGREES if known.is_angle else 1.0)
 
 
 def _row(

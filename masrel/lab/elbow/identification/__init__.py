@@ -19,6 +19,11 @@ from masrel.lab.elbow.identification._lack_of_fit import (
     PhaseResidual,
     StructureTest,
 )
+from masrel.lab.elbow.identification._laws import (
+    LawComparison,
+    LawFit,
+    compare_laws,
+)
 from masrel.lab.elbow.identification._reading import Movement, read_movement
 
 __all__ = [
@@ -27,12 +32,15 @@ __all__ = [
     "FittedParameter",
     "FrictionFit",
     "LackOfFit",
+    "LawComparison",
+    "LawFit",
     "Movement",
     "PhaseResidual",
     "Step",
     "StructureTest",
     "as_toml",
     "compare_fits",
+    "compare_laws",
     "fit",
     "fit_friction",
     "intermediate_models",

@@ -263,6 +263,14 @@ class Part(NamedTuple):
         """Return some of the samples."""
         return Part(*(column[which] for column in self))
 
+    def ahead(self, by: float) -> "Part":
+        """Return the part with an angle of so much later, s, to second order."""
+        return self._replace(
+            angle=self.angle + by * (self.velocity + 0.5 * by * self.acceleration),
+            velocity=self.velocity + by * (self.acceleration + 0.5 * by * self.jerk),
+            acceleration=self.acceleration + by * self.jerk,
+        )
+
     def then(self, later: "Part") -> "Part":
         """Return both parts as one."""
         return Part(*map(np.concatenate, zip(self, later, strict=True)))
@@ -387,6 +395,24 @@ class Trial:
     after: Part | None = field(default=None, compare=False)
     catch: Catch | None = None
     remark: str = ""
+
+    def ahead(self, by: float) -> "Trial":
+        """Return the trial with angles of so much later, s, and the same torque."""
+        catch, after = self.catch, self.after
+        if catch is not None:
+            travel = by * (catch.speed + 0.5 * by * catch.acceleration)
+            catch = replace(
+                catch,
+                angle=catch.angle + travel,
+                speed=catch.speed + by * catch.acceleration,
+                mean_speed=catch.mean_speed + catch.speed_gain * travel,
+            )
+        return replace(
+            self,
+            pre_catch=self.pre_catch.ahead(by),
+            after=None if after is None else after.ahead(by),
+            catch=catch,
+        )
 
 
 def slow_trial(stretch: Stretch) -> Trial:

@@ -253,6 +253,25 @@ class Equations:
         table[n:, -1] = [left for _, left, _ in rows]
         return table
 
+    def by_late_angle(self, values: Mapping[str, float]) -> _Floats:
+        """Return the residuals' derivatives by how much earlier the angle is, 1/s."""
+        shared, local = (
+            np.array([values[name] for name in names])
+            for names in (self.names, self.local)
+        )
+        early, late = (
+            Equations(
+                self.trial.ahead(by),
+                self.names,
+                self.spreads,
+                self.held,
+                on_line=self.on_line,
+                limit=self.limit,
+            ).table(shared, local)[:, -1]
+            for by in (-_STEP, _STEP)
+        )
+        return np.asarray((early - late) / (2.0 * _STEP))
+
     def law(self, values: Mapping[str, float]) -> _Floats:
         """Return the torque of the law at the trial's samples, N·m."""
         return self._evaluate(self.design(values), values)[0]
@@ -491,6 +510,20 @@ def fit_together(
         tables=[e.table(shared, own) for e, own in pairs],
         laws=tuple(e.law(x) for e, x in zip(equations, values, strict=True)),
     )
+
+
+def with_late_angle(joint: JointFit, lag: float) -> tuple[JointFit, float]:
+    """Return a fit with one more parameter, and by how much that is off, s.
+
+    It is the lag of the torque, below 0, by which the recordings were put right.
+    """
+    columns = map(Equations.by_late_angle, joint.equations, joint.values)
+    tables = [
+        np.insert(table, -1, column, axis=1)
+        for table, column in zip(joint.tables, columns, strict=True)
+    ]
+    whole = replace(joint, tables=tables, shared={**joint.shared, "lag": lag})
+    return whole, float(solve(whole.rows()).values[-1])
 
 
 def left_out_errors(joint: JointFit) -> _Floats:

@@ -48,7 +48,11 @@ from masrel.lab.elbow.identification._clusters import (
     Step,
     fitted,
 )
-from masrel.lab.elbow.identification._equations import JointFit, left_out_errors
+from masrel.lab.elbow.identification._equations import (
+    JointFit,
+    left_out_errors,
+    with_late_angle,
+)
 from masrel.lab.elbow.identification._lack_of_fit import (
     LEVEL,
     LackOfFit,
@@ -63,6 +67,7 @@ from masrel.lab.elbow.identification._reading import (
 )
 from masrel.lab.elbow.identification._rounds import (
     ALWAYS,
+    LATEST_S,
     FitOptions,
     Term,
     fit_in_rounds,
@@ -76,6 +81,9 @@ _Floats = NDArray[np.float64]
 
 # Options of `fit` that are tried in a comparison, each alone.
 TERMS = ("gravity", "arm_inertia", "drift", "lag", "rise")
+
+# Of the search for an angle that is late: fits, and the step that ends it, s.
+_LATE_ROUNDS, _SETTLED_S = 8, 2e-5
 
 # Two slow trials say little of how they differ, but not nothing of b.
 _MIN_DF = 4.0
@@ -275,11 +283,11 @@ def fit(
         level=level,
     )
     movements = [
-        _aligned(
-            entry if isinstance(entry, Movement) else read_movement(Path(entry)), lag
-        )
+        entry if isinstance(entry, Movement) else read_movement(Path(entry))
         for entry in recordings
     ]
+    if not isinstance(lag, str):
+        movements = aligned(movements, min(lag, 0.0))
     models = sorted({m.model for m in movements if m.model is not None})
     if len(models) > 1:
         raise RecordingError(
@@ -287,15 +295,14 @@ def fit(
             f"beside each recording names; got some of {', '.join(models)}"
         )
     stretches, rest_sd = _stretches(movements, options)
-    slow = fit_slow(_slow_trials(stretches, options.slow_below), options)
-    _check_slow(slow, stretches, options)
-    last = fit_in_rounds(stretches, slow, options)
+    slow = _slow_fit(stretches, options)
+    first = slow
+    slow, last = _search(movements, stretches, first, options)
     reasons: dict[str, str] = {}
     while untimed := untimed_terms(last):
         reasons |= untimed
-        terms: dict[str, Term] = {**options.terms, **dict.fromkeys(untimed, 0.0)}
-        options = replace(options, terms=terms)
-        last = fit_in_rounds(stretches, slow, options)
+        options = options.without(untimed)
+        slow, last = _search(movements, stretches, first, options)
     for trial in (*slow.trials, *last.fast):
         if trial.remark:
             warn_caller(f"{trial.stretch.name}: {trial.remark}", RecordingWarning)
@@ -314,12 +321,49 @@ def fit(
     return result
 
 
-def _aligned(movement: Movement, lag: Term) -> Movement:
-    # the torque as late as the angle beside it is, by a negative lag
-    if isinstance(lag, str) or lag >= 0.0:
-        return movement
-    time = movement.time
-    return replace(movement, torque=np.interp(time + lag, time, movement.torque))
+def aligned(movements: Sequence[Movement], lag: float) -> list[Movement]:
+    """Put the torque as late as the angle beside it is, by a negative lag."""
+    return [
+        replace(m, torque=np.interp(m.time + lag, m.time, m.torque)) if lag else m
+        for m in movements
+    ]
+
+
+def _search(
+    movements: Sequence[Movement],
+    stretches: Sequence[Stretch],
+    slow: JointFit,
+    options: FitOptions,
+) -> tuple[JointFit, JointFit]:
+    # the fits of slow trials and of all; a lag that is fitted may be below 0
+    late = None
+    if "lag" in options.fitted:
+        late = _late_fit(movements, stretches, slow, options.without(("lag",)))
+    return late or (slow, fit_in_rounds(stretches, slow, options))
+
+
+def _late_fit(
+    movements: Sequence[Movement],
+    stretches: Sequence[Stretch],
+    slow: JointFit,
+    options: FitOptions,
+) -> tuple[JointFit, JointFit] | None:
+    # with a lag below 0, towards which the first step without any leads, if it does
+    whole, step = with_late_angle(fit_in_rounds(stretches, slow, options), 0.0)
+    if all(trial.catch is None for trial in whole.trials):
+        return None
+    for _ in range(_LATE_ROUNDS):
+        lag = max(whole.shared["lag"] + step, -LATEST_S)
+        if not lag < 0.0:
+            return None
+        with warnings.catch_warnings():  # of the recordings, given before
+            warnings.simplefilter("ignore", MasrelWarning)
+            stretches, _ = _stretches(aligned(movements, lag), options)
+            slow = _slow_fit(stretches, options)
+        whole, step = with_late_angle(fit_in_rounds(stretches, slow, options), lag)
+        if abs(step) < _SETTLED_S:
+            break
+    return None if "lag" in untimed_terms(whole) else (slow, whole)
 
 
 def _stretches(
@@ -344,6 +388,12 @@ def _stretches(
             "grow with extension"
         )
     return stretches, float(np.median(noise)) if noise else math.nan
+
+
+def _slow_fit(stretches: Sequence[Stretch], options: FitOptions) -> JointFit:
+    slow = fit_slow(_slow_trials(stretches, options.slow_below), options)
+    _check_slow(slow, stretches, options)
+    return slow
 
 
 def _slow_trials(stretches: Sequence[Stretch], limit: float) -> list[Trial]:
@@ -626,6 +676,21 @@ class ComparedFit:
     is_chosen: bool
 
 
+def against_best(squares: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+    """Return mean squares (n_fits,), and what they are above the least, with errors.
+
+    `squares` (n_fits, n) are of what was left out in turn, which is what differs; of
+    fits that have none they are ``nan``.
+    """
+    n_fits, n = squares.shape
+    means = squares.mean(axis=1) if n else np.full(n_fits, math.nan)
+    more = squares - (
+        squares[np.nanargmin(means)] if not np.isnan(means).all() else 0.0
+    )
+    ses = more.std(axis=1, ddof=1) / math.sqrt(n) if n > 1 else 0.0 * means + math.nan
+    return means, more.mean(axis=1) if n else means, ses
+
+
 def compare_fits(
     recordings: Sequence[Movement | Path | str], **options: Any
 ) -> tuple[ComparedFit, ...]:
@@ -681,13 +746,7 @@ def compare_fits(
     ]
     names = sorted(set.intersection(*(set(of_fit) for of_fit in squares if of_fit)))
     rows = [[of_fit.get(name, math.nan) for name in names] for of_fit in squares]
-    table = np.array(rows)
-    means = table.mean(axis=1) if names else np.full(len(fits), math.nan)
-    best = int(np.nanargmin(means)) if names else 0
-    more, ses = table - table[best], np.full(len(fits), math.nan)
-    if len(names) > 1:
-        ses = more.std(axis=1, ddof=1) / math.sqrt(len(names))
-    worse = means - means[best]
+    means, worse, ses = against_best(np.array(rows))
     near = np.flatnonzero(worse <= ses).tolist()  # fits with fewer terms come first
     return tuple(
         ComparedFit(

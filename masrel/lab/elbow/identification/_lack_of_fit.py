@@ -53,6 +53,7 @@ STRUCTURES = {
     "arm_inertia": ("the inertia of the arm", "--arm-inertia fitted"),
     "drift": ("a drift of the torque", "--drift fitted"),
     "lag": ("a lag of the sensor", "--lag fitted"),
+    "late angle": ("an angle that is late beside the torque", "--lag fitted"),
     "catch_rise": ("a catch that takes time to rise", "--rise fitted"),
     "residual slope": ("a torque that changes within the catch", ""),
     "bent climb": ("a stiffness after the catch that changes", ""),
@@ -327,6 +328,7 @@ def _added(
     size = {"peak": 1.0, "residual": 1.0}
     if catch := e.trial.catch:
         size |= {"catch angle": catch.mean_speed**2, "travel": catch.mean_catch_speed}
+    columns["late angle"] = e.by_late_angle(values)
     for place, name in enumerate(rows):
         if name in size:
             columns[name] = np.zeros(n + len(rows))

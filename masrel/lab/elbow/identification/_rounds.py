@@ -8,7 +8,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section II.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal
@@ -40,7 +40,7 @@ Term = float | Literal["off", "fitted"]
 ALWAYS = ("damping", "stiffness", "inertia")
 
 # Of what takes time: where the search for it begins, s.
-_LATEST_S = 0.05  # that an angle may be beside its torque
+LATEST_S = 0.05  # that an angle may be beside its torque
 _STARTS = {"lag": (0.004, 0.016), "catch_rise": (0.01, 0.04, 0.08)}
 
 # In periods of samples: none is told from nothing that is shorter. The search may go
@@ -105,6 +105,10 @@ class FitOptions:
         """Return the names of what is fitted of the arm."""
         return tuple(name for name, term in self.terms.items() if term == "fitted")
 
+    def without(self, terms: Iterable[str]) -> "FitOptions":
+        """Return the options with none of these terms of the arm."""
+        return replace(self, terms={**self.terms, **dict.fromkeys(terms, 0.0)})
+
     @property
     def law(self) -> Law:
         """Return what is held of the arm."""
@@ -128,7 +132,7 @@ def _rules(name: str, term: object, longest: float) -> list[tuple[bool, str]]:
     is_number = isinstance(term, int | float) and math.isfinite(term)
     value = float(term) if isinstance(term, int | float) else 0.0
     is_size = name in ("arm_inertia", "lag", "catch_rise")
-    least = -_LATEST_S if name == "lag" else 0.0
+    least = -LATEST_S if name == "lag" else 0.0
     return [
         (
             not is_word and not is_number,
@@ -222,7 +226,7 @@ def untimed_terms(joint: JointFit) -> dict[str, str]:
         name: f"shorter than {1000.0 * floors[name]:.2g} ms, which these samples do "
         "not tell from nothing: taken as 0"
         for name, value in joint.shared.items()
-        if name in floors and value <= floors[name]
+        if name in floors and abs(value) <= floors[name]
     }
 
 

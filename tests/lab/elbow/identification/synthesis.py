@@ -63,6 +63,7 @@ class Arm:
     drift: float = 0.0  # N·m/s
     own_drift: float = 0.0  # N·m/s more in every other trial, and less in the others
     lag: float = 0.0  # s, of a sensor of first order
+    late: float = 0.0  # s, of the angle beside the torque
     rise: float = 0.0  # s, from the catch to its peak
     noise_time: float = 0.0  # s, over which noise is correlated; 0 is white
 
@@ -100,7 +101,8 @@ def recording(
         angle = start + _integral(speed)
     at = np.arange(round((time[-1] + 2 * REST) * rate)) / rate
     inside = np.clip(at - REST, 0.0, time[-1])
-    sampled = np.round(np.interp(inside, time, angle) / ENCODER) * ENCODER
+    late = np.clip(at - REST - arm.late, 0.0, time[-1])
+    sampled = np.round(np.interp(late, time, angle) / ENCODER) * ENCODER
     motion = time, angle, speed
     torque = _torque(joint, *motion, catch, inside, free)
     if arm != Arm():

@@ -55,8 +55,17 @@ def test_an_angle_that_is_late_is_put_right(
     right = fit(late, lag=-0.005)
     for name in NAMES:
         assert right[name].value == pytest.approx(found[name].value, rel=0.01)
-    silent = fit(late)["catch_slope"].value
-    assert silent != pytest.approx(found["catch_slope"].value, rel=0.03)
+    wrong = fit(late)
+    assert wrong["catch_slope"].value != pytest.approx(
+        found["catch_slope"].value, rel=0.03
+    )
+    assert wrong.lack_of_fit.sentence.endswith("try --lag fitted.")
+    # and the search finds by how much
+    searched = fit(late, lag="fitted")
+    assert searched["lag"].value == pytest.approx(-0.005, abs=0.001)
+    assert searched["lag"].low < -0.004
+    for name in NAMES:
+        assert searched[name].value == pytest.approx(found[name].value, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -36,8 +36,10 @@ WRONG = {
     "lag": Arm(lag=1.0 / (2.0 * math.pi * 20.0)),
     "rise": Arm(rise=0.08),
     "own drifts": Arm(own_drift=0.1),
+    "late angle": Arm(late=0.005),
 }
-TERMS = {wrong: {"own drifts": "drift"}.get(wrong, wrong) for wrong in WRONG}
+OPTIONS = {"own drifts": "drift", "late angle": "lag"}
+TERMS = {wrong: OPTIONS.get(wrong, wrong) for wrong in WRONG}
 RIGHT = {
     "white": {},
     "scattered": {"scatter": SCATTER},
@@ -78,6 +80,7 @@ def quiet_fit(movements: list[Movement], **options: object) -> ElbowFit:
     [
         "gravity",
         "rise",
+        "late angle",
         *(
             pytest.param(each, marks=pytest.mark.slow)
             for each in ("arm_inertia", "drift", "lag", "own drifts")

@@ -112,7 +112,7 @@ def test_a_fit_is_the_one_that_was_found_before(case: str) -> None:
         before["verdict"],
         before["remarks"],
     )
-    assert found["p_values"].keys() == before["p_values"].keys()
+    assert found["p_values"].keys() - {"late angle"} == before["p_values"].keys()
     for name, p_value in before["p_values"].items():
         # what is added passes a sensor's lag, as the law does, which it once did not
         if "lag" not in before["estimates"] or name not in ("gravity", "arm_inertia"):
