@@ -64,6 +64,24 @@ def test_a_fit_goes_into_a_protocol(
     assert joint.catch_slope == pytest.approx(0.35, rel=0.1)
 
 
+def test_laws_are_compared_where_the_elbows_own_is_refused(
+    masrel: Caller, files: list[Path]
+) -> None:
+    fast = [file for file in files if "fast" in file.name]
+    done = masrel("joint", "fit", *fast, "--laws", "spring-damper", "--json", "-")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    elbow, spring = document["laws"]
+    assert "b and k need a slow stretch" in elbow["reason"]
+    assert (spring["chosen"], spring["n_parameters"]) == (True, 2)
+    keys = [estimate["key"] for estimate in spring["estimates"]]
+    assert keys == ["stiffness_nm_rad", "damping_nms_rad"]
+    assert document["laws_sentence"].startswith("spring-damper predicts left-out")
+    both = masrel("joint", "fit", *fast, "--laws", "all", "--compare")
+    assert both.code == 2
+    assert "--compare, --laws: one compares terms of the arm" in both.err
+
+
 def test_slow_trials_alone_are_shown_and_make_no_model_file(
     masrel: Caller, files: list[Path], tmp_path: Path
 ) -> None:

@@ -370,12 +370,12 @@ def _binned(movement: Movement, options: Mapping[str, Any]) -> _Binned:
     whole = table[:, : table.shape[1] // n * n]
     time, angle, speed, push, torque, lost = whole.reshape(6, -1, n).mean(axis=2)
     part = Part(time, angle, speed, push, 0.0 * push, torque, torque)
-    law = Law(
-        constants=STANDARD_MODELS["HM1"],
-        fitted=(),
-        gravity_angle=options.get("gravity_angle", 0.0),
-    )
-    units = [replace(law, **{name: 1.0}).arm(part, "") for name in _ARM]
+    arm: dict[str, Any] = {
+        "constants": STANDARD_MODELS["HM1"],
+        "fitted": (),
+        "gravity_angle": options.get("gravity_angle", 0.0),
+    }
+    units = [Law(**(arm | {name: 1.0})).arm(part, "") for name in _ARM]
     used = lost == 0.0
     return _Binned(
         motion=Recorded(time=time, angle=angle),
@@ -444,9 +444,12 @@ def _law_fit(
         arm[fits] = x[len(row.free) :]
         return each.left(joint.torque(each.motion, each.times) + each.arm @ arm)
 
+    def residuals(x: _Floats) -> _Floats:
+        return np.concatenate([left(x, each) for each in binned])
+
     def search(start: _Floats, most: int) -> OptimizeResult:
         return least_squares(
-            lambda x: np.concatenate([left(x, each) for each in binned]),
+            residuals,
             start,
             bounds=(low, high),
             x_scale="jac",

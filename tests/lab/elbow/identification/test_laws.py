@@ -35,7 +35,7 @@ from masrel.lab.elbow.tone import (
 )
 
 NOISE, ENCODER = 0.05, math.radians(0.09)
-SPEEDS = (8.0, 10.0, 60.0, 80.0, 100.0, 120.0)  # mean, deg/s
+SPEEDS = (6.0, 7.0, 60.0, 80.0, 100.0, 120.0)  # mean, deg/s
 TRUE: dict[str, JointModel] = {
     "spring-damper": LeadPipe(coulomb_torque=0.0),
     "lead-pipe-rigidity": LeadPipe(),
@@ -86,8 +86,8 @@ def of(found: LawComparison, name: str) -> int:
     return [each.name for each in found.fits].index(name)
 
 
-# Of 27 comparisons (seeds 0 to 2) the true law was chosen in all but those said on the
-# page of evidence; a seed that fails here is a change, not chance.
+# The seed is fixed. A larger law that contains the true one predicts better by more
+# than one standard error by chance: of six recordings in 18 % of seeds at most, by t.
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TRUE)
 def test_its_own_law_predicts_left_out_recordings_best(name: str) -> None:
