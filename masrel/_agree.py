@@ -1,4 +1,4 @@
-"""One call from ratings in any form to their agreement, as the command line has it."""
+"""From ratings in any form to their agreement in one call, like ``masrel agree``."""
 
 import math
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ _NAMES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Agreement:
-    """How well raters agree: a row for every coefficient, and what was read.
+    """Agreement of raters: one row per coefficient, and what was read.
 
     Attributes
     ----------
@@ -196,18 +196,18 @@ def agree(
     Parameters
     ----------
     data : DataFrame, path, dict of columns or array_like
-        Ratings: one row an item and a column a rater, or one row a rating. A DataFrame
-        of pandas or polars, a table of Arrow or a relation of DuckDB; the path of a
-        file in any form; columns by name; or rows of grades, items by raters. Ordered
-        categories are the scale in order, and a named index is a column.
+        Ratings with one row per item and one column per rater, or one row per rating: a
+        DataFrame of pandas or polars, a table of Arrow or a relation of DuckDB; the
+        path of a file in any form; columns by name; or rows of grades, items by raters.
+        Ordered categories give the scale in order, and a named index is a column.
     item : str or sequence of str, optional
         Column of the items; several name an item together.
     rater, grade : str, optional
-        Columns of a long table, one row a rating.
+        Columns of a long table, with one row per rating.
     raters : str or sequence of str, optional
         Columns of a wide table that are raters.
     target : {"items", "raters", "both"}, optional
-        What a new study would draw anew; no interval without it.
+        The population to generalise to; without it no interval is given.
     coefficients : str or sequence of str, optional
         Names of coefficients, or "all" that fit; percent agreement and Fleiss' kappa
         unless given.

@@ -1,4 +1,4 @@
-"""What goes out: files that are whole or not there, cells that are no formulas.
+"""Output: files written whole or not at all, and cells that are not formulas.
 
 A file is made under another name beside the one that it replaces, synced, and gets its
 name in one step, which is synced too: a kill or a full disk leaves the old bytes or the
@@ -157,7 +157,7 @@ def _mode(path: Path) -> int | None:
     except FileNotFoundError:  # nothing, or a link to nothing, which is replaced
         return None
     if not stat.S_ISREG(mode):  # such as /dev/stdout, which "-" stands for
-        raise OSError(errno.EINVAL, "needs to be a file, or nothing yet", str(path))
+        raise OSError(errno.EINVAL, "needed a file or a new name", str(path))
     if path.is_symlink():
         return None  # the permissions of another file
     if not os.access(path, os.W_OK):
@@ -234,7 +234,7 @@ def refuse_record(path: Path) -> None:
         refuse(
             (
                 is_record and (root / _PROTOCOL).is_file(),
-                f"{path}: needs a file that is no primary record, got one of the "
+                f"{path}: needed another file, because this is a primary record of the "
                 f"study {root}",
             )
         )

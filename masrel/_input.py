@@ -1,4 +1,4 @@
-"""What comes in: the rules that it breaks, as a sentence, and what is warned of."""
+"""Input: checks of arguments, refusals in one sentence, and warnings."""
 
 import re
 import sys

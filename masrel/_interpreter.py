@@ -1,4 +1,4 @@
-"""The interpreter: what it loads late, and when it looks for garbage."""
+"""The interpreter: which modules load late, and when garbage is collected."""
 
 import gc
 import importlib

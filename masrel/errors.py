@@ -1,4 +1,4 @@
-"""Everything masrel raises or warns on purpose.
+"""Every error and warning that masrel raises on purpose.
 
 The tree::
 
@@ -119,11 +119,11 @@ class ConvergenceError(MasrelError, RuntimeError):
 
 
 class SessionStoppedError(MasrelError, RuntimeError):
-    """A person stopped a session before its end; it can be gone on with."""
+    """A person stopped a session before its end; it can be resumed."""
 
 
 class DeviceError(MasrelError, RuntimeError):
-    """The device cannot go on.
+    """The device cannot continue.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class BusError(_KindError):
 
 
 class FrameError(DeviceError, ValueError):
-    """Bytes on a device's bus are no frame of it, or a value fits in none."""
+    """Bytes on a device's bus are not a valid frame, or a value does not fit in one."""
 
     kind = "bad-frame"
 
@@ -217,15 +217,15 @@ class UndefinedStatisticWarning(MasrelWarning):
 
 
 class SmallSampleWarning(MasrelWarning):
-    """An interval rests on too little data to hold what it says."""
+    """An interval is based on too little data for its stated coverage."""
 
 
 class RatingsWarning(MasrelWarning):
-    """Labels of ratings look as if they stood for missing ones."""
+    """Labels of ratings look like missing ratings."""
 
 
 class MissingLettersWarning(MasrelWarning):
-    """Figures have letters for which no font is there; it says how to give one.
+    """No font has some letters of a figure; the warning says how to name one.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ _MAX_LETTERS = 40
 
 
 class RecordingWarning(MasrelWarning):
-    """Part of a recording is not used, or looks as if it were not what it says."""
+    """Part of a recording is not used, or does not look like what it says."""
 
 
 class OverrunWarning(MasrelWarning):

@@ -125,7 +125,7 @@ MODIFIED_ASHWORTH = Scale(name="MAS", grades=("0", "1", "1+", "2", "3", "4"))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishedScale:
-    """A scale of the literature, by the name that a protocol gives it.
+    """A published scale, with the name that protocols use.
 
     Attributes
     ----------
@@ -238,7 +238,7 @@ PUBLISHED_SCALES: Mapping[str, PublishedScale] = MappingProxyType(
 
 
 def published_scale(scale: Scale) -> PublishedScale | None:
-    """Return the scale of the literature that a scale is, or is a part of.
+    """Return the published scale that a scale is, or is a part of.
 
     Parameters
     ----------

@@ -225,7 +225,7 @@ ONE_WAY = {"item": "patient", "reading": masrel.Reading(item="patient")}
 @pytest.mark.parametrize(
     ("data", "arguments", "why"),
     [
-        ([[1, 2], [1]], {}, "rows of the same length"),
+        ([[1, 2], [1]], {}, "rows of equal length"),
         ([1, 2, 1], {}, "the data: needed a path, a DataFrame"),
         ([], {}, "needed a path"),
         (np.zeros(3), {}, "needed a path"),
@@ -254,9 +254,9 @@ ONE_WAY = {"item": "patient", "reading": masrel.Reading(item="patient")}
         (
             FRAME,
             {"reading": masrel.Reading(encoding="utf-8")},
-            "is of files, got a DataFrame",
+            "needed a file, got a DataFrame",
         ),
-        (FRAME, {"reading": masrel.Reading(stream=True)}, "is of files"),
+        (FRAME, {"reading": masrel.Reading(stream=True)}, "needed a file"),
         (FRAME, ONE_WAY, "item: needed once"),
         (FRAME, {"reading": {"item": "patient"}}, r"needs masrel.Reading\(…\)"),
         (FRAME, {"estimating": masrel.Reading()}, r"needs masrel.Estimating\(…\)"),

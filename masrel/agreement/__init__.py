@@ -1,4 +1,4 @@
-"""Agreement statistics from any table of ratings; numpy is all they load.
+"""Agreement statistics from any table of ratings; they load only numpy.
 
 In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`, or a
 `Significance` from a test.

@@ -28,7 +28,7 @@ from masrel.errors import CountsError, ParameterError, RatingsError
 
 Integers = NDArray[np.int64]
 
-_NOTHING = "ratings: needs a table (items, raters) of at least one of each"
+_NOTHING = "ratings: needs a table (items, raters) with at least one item and one rater"
 
 _MAX_SPAN = 1 << 14  # of whole numbers that are codes but for a shift
 _MAX_KEYS = 1 << 22  # different rows that are counted in a table rather than sorted
@@ -366,7 +366,7 @@ def code_long(
     categories: Sequence[Label] | None = None,
     repeated: Repeated = "error",
 ) -> CodedRatings:
-    """Arrange a long DataFrame, one row a rating, item by rater.
+    """Arrange a DataFrame with one row per rating as items by raters.
 
     Parameters
     ----------
@@ -602,8 +602,8 @@ class CountedRatings:
         refuse(
             (
                 n_items * width > _MAX_PLACES,
-                f"ratings: needs at most {_MAX_PLACES:.0e} to arrange them item by "
-                f"item, got {n_items} items of up to {width}",
+                f"ratings: needs at most {_MAX_PLACES:.0e} ratings to arrange them "
+                f"item by item, got {n_items} items with up to {width} each",
             ),
             error=CountsError,
         )
@@ -796,7 +796,7 @@ def item_counts(
 def count_table(
     table: ArrayLike, *, categories: Sequence[Label] | None = None
 ) -> CountedRatings:
-    """Take a contingency table of two raters as counted ratings.
+    """Return counted ratings from a contingency table of two raters.
 
     Parameters
     ----------
@@ -840,7 +840,7 @@ def count_table(
 def count_items(
     counts: ArrayLike, *, categories: Sequence[Label] | None = None
 ) -> CountedRatings:
-    """Take how many raters chose each category, item by item, as counted ratings.
+    """Return counted ratings from the number of raters per item and category.
 
     Parameters
     ----------

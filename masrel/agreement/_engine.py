@@ -234,7 +234,7 @@ def check_level(level: float, name: str = "level") -> None:
     is_number = isinstance(level, int | float | np.integer | np.floating)
     # a level so near to 1 that its upper quantile is that of 1 has no ends
     is_level = is_number and 0.0 < level < 1.0 and 0.5 + 0.5 * level < 1.0
-    refuse((not is_level, f"{name}: needs (0, 1), got {shown(level)}"))
+    refuse((not is_level, f"{name}: needs a number in (0, 1), got {shown(level)}"))
 
 
 def recorded_generator(

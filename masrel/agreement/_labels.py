@@ -1,4 +1,4 @@
-"""Labels of ratings: what may be one, what is missing, and the scale they make.
+"""Labels of ratings: which are valid, which are missing, and the scale they make.
 
 Also rows of named fields, such as an item, a rater and a grade, as columns.
 """

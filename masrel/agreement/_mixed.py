@@ -206,25 +206,7 @@ def components(values: Floats, *, has_raters: bool) -> Components | str:
         of_items, of_raters = float(means.var(ddof=1)), float(levels.var(ddof=1))
         of_items = of_items if of_items > none else 0.0
         return replace(fit, items=of_items, raters=of_raters)
-    axes, _ = np.linalg.qr(np.column_stack([np.ones(len(levels)), np.eye(len(levels))]))
-    within = np.zeros((len(levels) + 1, len(levels) + 1))
-    within[:-1, :-1] = axes.T @ laplacian @ axes
-    within[-1, :-1] = within[:-1, -1] = axes.T @ rest.sum(axis=0)
-    within[0] = within[:, 0] = 0.0  # items have no mean of raters within
-    within[-1, -1] = squares
-    sums = np.column_stack([rated @ axes, (rated * (centred - levels)).sum(axis=1)])
-    basis = np.column_stack([axes.T @ np.ones(len(levels)), axes.T @ levels])
-    distinct, freq = np.unique(sizes, return_counts=True)
-    of_size = [sums[sizes == size] for size in distinct]
-    likelihood = _Likelihood(
-        sizes=distinct.astype(float),
-        freq=freq.astype(float),
-        between=np.array([items.T @ items for items in of_size]),
-        within=within,
-        basis=np.vstack([basis, [0.0, 1.0]]),
-        n_ratings=n_ratings,
-        has_raters=has_raters,
-    )
+    likelihood = _likelihood_of(rated, centred, rest, levels, laplacian, has_raters)
     ratios = likelihood.maximum(df * float((centred**2).max()) / squares)
     residual = float(likelihood.parts(ratios[None])[1][0]) / (n_ratings - 1)
     return replace(
@@ -234,4 +216,36 @@ def components(values: Floats, *, has_raters: bool) -> Components | str:
         residual=residual,
         ratios=ratios,
         likelihood=likelihood,
+    )
+
+
+def _likelihood_of(
+    rated: NDArray[np.bool_],
+    centred: Floats,
+    rest: Floats,
+    levels: Floats,
+    laplacian: Floats,
+    has_raters: bool,
+) -> _Likelihood:
+    """Return the likelihood of ratings (n_items, n_raters), by sizes of items."""
+    # levels: raters' fixed effects; rest: what these and those of items leave
+    sizes = rated.sum(axis=1)
+    axes, _ = np.linalg.qr(np.column_stack([np.ones(len(levels)), np.eye(len(levels))]))
+    within = np.zeros((len(levels) + 1, len(levels) + 1))
+    within[:-1, :-1] = axes.T @ laplacian @ axes
+    within[-1, :-1] = within[:-1, -1] = axes.T @ rest.sum(axis=0)
+    within[0] = within[:, 0] = 0.0  # items have no mean of raters within
+    within[-1, -1] = float((rest**2).sum())
+    sums = np.column_stack([rated @ axes, (rated * (centred - levels)).sum(axis=1)])
+    basis = np.column_stack([axes.T @ np.ones(len(levels)), axes.T @ levels])
+    distinct, freq = np.unique(sizes, return_counts=True)
+    of_size = [sums[sizes == size] for size in distinct]
+    return _Likelihood(
+        sizes=distinct.astype(float),
+        freq=freq.astype(float),
+        between=np.array([items.T @ items for items in of_size]),
+        within=within,
+        basis=np.vstack([basis, [0.0, 1.0]]),
+        n_ratings=int(sizes.sum()),
+        has_raters=has_raters,
     )

@@ -1,4 +1,4 @@
-"""Components of highest restricted likelihood, of designs with gaps.
+"""Components by restricted maximum likelihood, for designs with gaps.
 
 Henderson's mixed-model equations: of random effects scaled by √ratio to the residual,
 of the mean and of the ratings themselves. Effects that hold the largest column are

@@ -1,4 +1,4 @@
-"""What an estimate shows: p-values, and words for values with their probabilities."""
+"""Tests of estimates, and words for their values with probabilities."""
 
 import math
 from collections.abc import Sequence
@@ -136,7 +136,7 @@ def p_value(
 
 
 def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float:
-    """Return the p-value of the hypothesis that a coefficient lies outside two values.
+    """Return the p-value of the hypothesis that a coefficient is outside two values.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def benjamini_yekutieli(p_values: Sequence[float]) -> list[float]:
-    """Return p-values adjusted for the share of false rejections among rejections.
+    """Return p-values adjusted for the false discovery rate.
 
     Parameters
     ----------
@@ -301,7 +301,12 @@ def _checked_p_values(p_values: Sequence[float]) -> tuple[Floats, NDArray[np.int
     for place, p in enumerate(p_values):
         is_number = isinstance(p, int | float | np.number)
         is_in = is_number and (math.isnan(p) or 0.0 <= p <= 1.0)
-        refuse((not is_in, f"p_values: place {place}: needs [0, 1], got {shown(p)}"))
+        refuse(
+            (
+                not is_in,
+                f"p_values: place {place}: needs a number in [0, 1], got {shown(p)}",
+            )
+        )
     checked = np.array(p_values, dtype=float)
     return checked, np.argsort(checked)[: int((~np.isnan(checked)).sum())]
 
@@ -441,7 +446,7 @@ def strength(value: float, *, scale: BandScale = "landis_koch") -> str:
 def benchmark(
     estimate: Estimate, *, scale: BandScale = "landis_koch", level: float = 0.95
 ) -> str:
-    """Return the best word that the estimate earns with a stated probability.
+    """Return the highest band that the true value reaches with a stated probability.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Two ratings of the same items as a table: tests of change, and what margins do."""
+"""Two ratings of the same items: tests of change, and effects of the margins."""
 
 import math
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ def contingency_table(
 
 
 def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
-    """Test whether two ratings choose the second of two categories alike often.
+    """Test whether two ratings choose the second of two categories equally often.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
 
 
 def bowker(table: ArrayLike) -> Significance:
-    """Test whether changes between every two categories go both ways alike often.
+    """Test whether changes in both directions are equally frequent (symmetry).
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def _chi_squared(
 
 
 def prevalence_index(table: ArrayLike) -> float:
-    r"""Return how unequally often both raters choose the same of two categories.
+    r"""Return how unequal the frequencies of agreement on two categories are.
 
     Parameters
     ----------
@@ -407,7 +407,7 @@ def kappa_max(table: ArrayLike) -> float:
 
 
 def specific_agreement(table: ArrayLike) -> tuple[float, ...]:
-    """Return how often, where one rater chose a category, the other did so, too.
+    """Return how often one rater chose a category when the other did.
 
     Parameters
     ----------

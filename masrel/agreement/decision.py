@@ -1,4 +1,4 @@
-"""Decision studies: how reliable the mean over so many levels of facets would be.
+"""Decision studies: how reliable means over given numbers of levels are.
 
 In: a `GStudy`, and how many levels of each facet. Out: error variances and reliability,
 with intervals, and the cheapest numbers of levels for an aim.
@@ -25,7 +25,7 @@ _MOST_DESIGNS = 200_000  # that are looked at for an aim
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DStudy:
-    """What the mean over a design tells of a person, by components of variance.
+    """Reliability of the mean over a design, from components of variance.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def d_study(
     fixed: Sequence[str] | None = None,
     cut: float | None = None,
 ) -> DStudy:
-    """Return the reliability of the mean over so many levels of each facet.
+    """Return the reliability of means over given numbers of levels of each facet.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def cheapest_design(
     prices: Sequence[float] | None = None,
     of: Literal["dependability", "generalizability"] = "dependability",
 ) -> DStudy:
-    """Return the cheapest numbers of levels by which an aim is reached.
+    """Return the cheapest design that reaches an aim.
 
     Parameters
     ----------
@@ -279,8 +279,9 @@ def cheapest_design(
     refuse(
         (
             not (reached >= aim).any(),
-            f"aim: needs at most {reached.max():.3g}, the value with {most} levels of "
-            f"each facet, got {shown(aim)}",
+            f"aim: cannot be reached with up to {most} levels of each facet: the "
+            f"highest value is {reached.max():.3g}, got {shown(aim)}"
+            + f"; {study.of} has no variance" * bool(reached.max() == 0.0),
         )
     )
     costs: Any = prices[-1] * study.n_levels[study.of] * math.prod(sizes.values())
@@ -333,7 +334,7 @@ def design_precision(
     n_studies: int = 200,
     rng: int = 0,
 ) -> PlannedDesign:
-    """Simulate g studies of a design, with the components of one that is known.
+    """Simulate g studies of a design, with the components of a given study.
 
     Parameters
     ----------

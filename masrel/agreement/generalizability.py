@@ -1,6 +1,6 @@
-"""Generalizability studies: variance of persons and facets, and what would be reliable.
+"""Generalizability studies: variances of persons and facets.
 
-In: one row a rating, with columns for what is measured and for each facet. Out: a
+In: one row per rating, with columns for what is measured and for each facet. Out: a
 variance component for every effect, from which `decision` has the reliability of other
 numbers of levels.
 """
@@ -293,7 +293,9 @@ def g_study(
     effects = _effects_of(of, facets, nested)
     cells = _cells(codes, effects, len(values))
     scaled, unit = deviations(values)
-    refuse((unit > 1e150, "ratings: grades need to be small enough for squares"))
+    refuse(
+        (unit > 1e150, "ratings: grades are too large, because their squares overflow")
+    )
     scaled -= scaled.mean()
     balanced = mean_squares(scaled, cells)
     parts, draws, method, notes = _fit(scaled, cells, codes, balanced, generator)
@@ -378,7 +380,7 @@ def _check_design(
     refuse(
         (
             not is_few or len({*columns}) < len(columns),
-            f"facets: need one to 3 columns besides {of!r}, got {shown(facets)}",
+            f"facets: need one to three columns besides {of!r}, got {shown(facets)}",
         ),
         (
             strange,

@@ -1,4 +1,4 @@
-"""What mean squares say: intraclass correlations, Robinson's A, and W, of ranks.
+"""Coefficients of mean squares: intraclass correlations, Robinson's A, Kendall's W.
 
 The interval of absolute agreement is read from the profile of the restricted
 likelihood, which depends on a complete table by its mean squares alone. A table with
@@ -208,7 +208,7 @@ def icc(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VarianceComponents:
-    """What the variance of a rating is made of, and how that was estimated.
+    """Components of the variance of a rating, and how they were estimated.
 
     Attributes
     ----------
@@ -432,7 +432,7 @@ def kendall_w(
     ties: bool = True,
     level: float = 0.95,
 ) -> Estimate:
-    """Estimate how far raters put the items into the same order.
+    """Estimate Kendall's W: how much raters agree on the order of the items.
 
     Parameters
     ----------

@@ -385,7 +385,7 @@ def brennan_prediger(
     weights: "WeightsLike" = "identity",
     population: int | None = None,
 ) -> Estimate:
-    """Estimate Brennan and Prediger's coefficient, of two categories PABAK.
+    """Estimate Brennan and Prediger's coefficient (PABAK for two categories).
 
     Parameters
     ----------
@@ -748,7 +748,7 @@ def fleiss_null(
     category: Label | None = None,
     categories: Sequence[Label] | None = None,
 ) -> Significance:
-    """Test whether Fleiss' kappa is 0, by its standard error when it is.
+    """Test whether Fleiss' kappa is 0, with the standard error under that hypothesis.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far measurements lie apart: their error, limits of agreement, concordance."""
+"""Measurements: their standard error, limits of agreement, and concordance."""
 
 import math
 from collections.abc import Sequence
@@ -265,12 +265,12 @@ def _variance_ends(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimitsOfAgreement:
-    """Between which bounds the differences of two raters lie.
+    """Limits between which most differences of two raters lie.
 
     Attributes
     ----------
     mean, sd : float
-        Mean and standard deviation of the differences, first less second.
+        Mean and standard deviation of the differences, first minus second.
     lower, upper : float
         The limits: mean ∓ z sd; ``nan`` when undefined.
     share : float

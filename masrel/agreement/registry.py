@@ -1,4 +1,4 @@
-"""Every coefficient by name, with what is true of it."""
+"""Every coefficient by name, with its properties."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -86,7 +86,7 @@ _EVERY: frozenset[Property] = frozenset(get_args(Property))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coefficient:
-    """A coefficient, how to compute it, and what is true of it.
+    """A coefficient, how to compute it, and its properties.
 
     Attributes
     ----------

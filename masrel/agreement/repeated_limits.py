@@ -1,7 +1,7 @@
-"""Limits of agreement beyond two raters once each: repeats, slopes, several observers.
+"""Limits of agreement with repeats, with slopes, and of several observers.
 
-In: one row a measurement of an item, a column for each method or observer. Out: limits
-with their intervals, for single measurements.
+In: one row per measurement of an item, and one column per method or observer. Out:
+limits with their intervals, for single measurements.
 """
 
 import math
@@ -39,12 +39,12 @@ _LimitsKind = Literal["difference", "proportional", "ratio"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RepeatedLimits:
-    """Between which bounds single differences, or ratios, of two methods lie.
+    """Limits between which most single differences, or ratios, of two methods lie.
 
     Attributes
     ----------
     bias : float
-        Mean difference, first less second, each item counting once; or how many times
+        Mean difference, first minus second, each item counting once; or how many times
         the second the first is, by the geometric mean.
     sd : float
         Standard deviation of the difference of two single measurements; of that of
@@ -139,18 +139,18 @@ def limits_with_repeats(
     Parameters
     ----------
     data : DataFrame
-        One row a measurement of an item by either method, or by both.
+        One row per measurement of an item by either method, or by both.
     item, first, second : str
         Names of the columns of items and of what each method measured; a number that is
         missing was not measured.
     truth : {"constant", "varying"}, optional
-        Whether an item has one true value, so that either method may repeat it in rows
-        of its own; or a row is a pair that was taken together of a value that may move.
+        Whether an item has one true value, which either method may measure in rows of
+        its own; or each row is a pair measured together, and the true value may change.
     kind : {"difference", "proportional", "ratio"}, optional
-        Of differences alike whatever is measured; of differences that follow the mean
-        of both methods in a line; or of ratios, by logarithms.
+        Limits of differences that are the same for all values, of differences that
+        follow a line over the mean of both methods, or of ratios, by logarithms.
     share : float, optional
-        Of the differences of single measurements that are to lie between the limits.
+        Share of the differences of single measurements that lie between the limits.
     level : float, optional
         Level of the intervals.
 
@@ -170,13 +170,13 @@ def limits_with_repeats(
     Warns
     -----
     UndefinedStatisticWarning
-        If fewer than two items were measured by both methods; three, with different
-        means, where the kind is proportional.
+        If fewer than two items were measured by both methods; for "proportional",
+        fewer than three, or items that all have the same mean.
 
     Notes
     -----
     Differences are taken to be normal, about their mean or a line, and to spread as
-    much whatever is measured. Of a constant truth the variance of a single difference
+    much whatever is measured. With a constant truth the variance of a single difference
     is that of the items' mean differences, and (1 − 1/m) of each method's within items,
     with m the harmonic mean of its measurements of an item [1]_, table I. The intervals
     of the limits combine those of the bias and of each variance (MOVER), with a note
@@ -209,12 +209,8 @@ def limits_with_repeats(
     check_option("kind", kind, get_args(_LimitsKind))
     check_level(share, "share")
     check_level(level)
-    check_frame(data, (item, first, second), "data")
-    codes, items = levels(data[item], item)
-    x, y = (_values(data, name, kind) for name in (first, second))
-    # of pairs, a row without its second says nothing
-    x, y = (x + 0.0 * y, y + 0.0 * x) if truth == "varying" else (x, y)
-    cells = [_cells(codes, values, len(items)) for values in (x, y)]
+    codes, n_items, x, y = _measured(data, item, (first, second), truth, kind)
+    cells = [_cells(codes, values, n_items) for values in (x, y)]
     chosen = (cells[0][0] > 0.0) & (cells[1][0] > 0.0)
     (_, of_x, _), (_, of_y, _) = (of[:, chosen] for of in cells)
     averages, differences = 0.5 * (of_x + of_y), of_x - of_y  # (n_items,)
@@ -227,7 +223,7 @@ def limits_with_repeats(
     lean, df = (slope, n - 2.0) if is_line else (0.0, n - 1.0)
     residuals = differences - lean * averages
     rows = [x - y - 0.5 * lean * (x + y)] if truth == "varying" else [x, y]
-    repeats = [_cells(codes, of, len(items))[:, chosen] for of in rows]
+    repeats = [_cells(codes, of, n_items)[:, chosen] for of in rows]
     within, parts = zip(*map(_within, repeats), strict=True)
     between = math.nan if reason else n * float(residuals.var()) / df
     nothing = Interval(
@@ -264,6 +260,18 @@ def limits_with_repeats(
         )
     )
     return _as_ratios(result) if kind == "ratio" else result
+
+
+def _measured(
+    data: Any, item: str, names: tuple[str, str], truth: _Truth, kind: _LimitsKind
+) -> tuple[NDArray[np.int64], int, Floats, Floats]:
+    """Return the item of each row, how many there are, and both methods' numbers."""
+    check_frame(data, (item, *names), "data")
+    codes, items = levels(data[item], item)
+    x, y = (_values(data, name, kind) for name in names)
+    if truth == "varying":  # of pairs, a row without its second says nothing
+        x, y = x + 0.0 * y, y + 0.0 * x
+    return codes, len(items), x, y
 
 
 def _values(data: Any, name: str, kind: _LimitsKind) -> Floats:
@@ -418,7 +426,7 @@ def _within(cells: Floats) -> tuple[float, tuple[float, float]]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimitsWithMean:
-    """How far a single measurement lies from the mean of several observers.
+    """Limits of agreement with the mean of several observers.
 
     Attributes
     ----------
@@ -614,7 +622,7 @@ def limits_by_clusters(
     check_level(level)
     check_frame(data, (clusters,), "data")
     codes, names = levels(data[clusters], clusters)
-    needed = f"clusters: needs two or more to leave out, got {len(names)}"
+    needed = f"clusters: needs two or more, because each is left out, got {len(names)}"
     refuse((len(names) < 2, needed), error=RatingsError)
     # of all rows, and without each cluster
     results: list[Any] = [measure(data[codes != k]) for k in range(-1, len(names))]
@@ -639,7 +647,7 @@ def _of_pairs(results: list[Any], level: float) -> Any:
     refuse(
         (
             limits.kind == "proportional",
-            ("measure: needs limits that do not follow a line"),
+            "measure: needs limits that do not follow a line",
         )
     )
     is_ratio = limits.kind == "ratio"

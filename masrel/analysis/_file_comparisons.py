@@ -1,7 +1,7 @@
 """How much the groups of a file differ in agreement: pair by pair, and all at once.
 
 In: a `RatingsFile` whose parts are the groups. Out: rows of the differences of
-coefficients with their tests, and of tests that all groups agree as well.
+coefficients with their tests, and of tests that all groups agree equally well.
 """
 
 import itertools

@@ -60,7 +60,7 @@ _BY_ITEM = ("retest", "each_category", "symmetry", "indices")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimating:
-    """What is estimated of ratings, and how.
+    """Which estimates are made from ratings, and how.
 
     Parameters
     ----------
@@ -587,7 +587,7 @@ def estimate_row(
         is_left_out = questions.takes_all or is_by_program or entry.formula is None
         if questions.target is None or not is_left_out:
             raise
-        why = "there is none for it" if entry.formula is None else error
+        why = "none is available" if entry.formula is None else error
         notes.append(f"no interval: {why}")
         questions = replace(questions, target=None, convention=None)
         estimate = _estimate(entry, ratings, questions, questions.level)

@@ -1,4 +1,4 @@
-"""Judges of a file beside its humans: whether they may stand for one, and rates.
+"""Judges in a file compared with its humans, and rates corrected for their errors.
 
 In: a `RatingsFile` some of whose raters are judges. Out: rows of judges, of humans, and
 of rates corrected for a judge.
@@ -31,6 +31,7 @@ from masrel.analysis._gates import read_gate
 from masrel.analysis._judging import Judging
 from masrel.estimates import _population, as_document
 from masrel.judges import (
+    HumanBesideJudge,
     advantage,
     advantage_differences,
     alternative_annotator_test,
@@ -251,24 +252,24 @@ def _beside_humans(part: _Part) -> _Made:
         texts = [f"left out: {', '.join(left_out)}"] if left_out else []
         yield "judges", *_with_interval(part, judge, row, texts)
         for human in result.humans:
-            row = {
-                "judge": judge,
-                "human": human.name,
-                **{of.name: getattr(human, of.name) for of in fields(human)[1:]},
-                "ties": human.n_items - human.b - human.c,
-                "difference": human.human_share - human.judge_share,
-            }
-            if part.clusters is None:  # else it would be too short
-                ends = score_test(human.b, human.c, human.n_items, level=level)
-                row |= {"difference_low": ends.low, "difference_high": ends.high}
-            yield (
-                "humans",
-                row,
-                {
-                    "title": f"{human.name}, {judge}",
-                    "not_worse": _YES[human.is_rejected],
-                },
-            )
+            yield "humans", *_human_row(part, judge, human)
+
+
+def _human_row(part: _Part, judge: str, human: HumanBesideJudge) -> tuple[Row, Row]:
+    """Return the row of a human beside a judge, and what a table shows otherwise."""
+    row = {
+        "judge": judge,
+        "human": human.name,
+        **{of.name: getattr(human, of.name) for of in fields(human)[1:]},
+        "ties": human.n_items - human.b - human.c,
+        "difference": human.human_share - human.judge_share,
+    }
+    if part.clusters is None:  # else it would be too short
+        level = part.questions.level
+        ends = score_test(human.b, human.c, human.n_items, level=level)
+        row |= {"difference_low": ends.low, "difference_high": ends.high}
+    title = f"{human.name}, {judge}"
+    return row, {"title": title, "not_worse": _YES[human.is_rejected]}
 
 
 def _how(part: _Part) -> dict[str, Any]:
@@ -560,7 +561,7 @@ _GATED = {
 
 
 def _with_gates(answers: Sequence[Answer], require: Sequence[str]) -> Iterator[Answer]:
-    """Give answers, and what of them is held against ``rate.low >= 0.8``."""
+    """Give answers, and what ``rate.low >= 0.8`` is checked against."""
     yield from answers
     if not require:
         return

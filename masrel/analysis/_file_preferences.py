@@ -1,4 +1,4 @@
-"""Preferences in a file: whether the order of two answers decides, and which is better.
+"""Preferences in a file: whether the order of two answers matters, and which is better.
 
 In: a `RatingsFile` whose parts are the answers shown first, and whose grades are the
 answers preferred. Out: rows of judges, and of the answers that each preferred.

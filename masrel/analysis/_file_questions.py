@@ -1,4 +1,4 @@
-"""Questions about a file of ratings beside its agreement, and rows that answer them.
+"""Further questions about a file of ratings, and the rows that answer them.
 
 In: a `RatingsFile` and how estimates are made. Out: an `Answer`, whose rows are as the
 JSON has them; what tables show otherwise stands beside them.
@@ -67,6 +67,7 @@ from masrel.estimates import Interval, as_document
 from masrel.ratings import RatingsFile, RatingsPart
 
 if TYPE_CHECKING:
+    from masrel.agreement import Coefficient
     from masrel.intervals.diagnosis import Diagnosis
 
 _T = TypeVar("_T")
@@ -125,7 +126,7 @@ def answers(
 
 
 def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
-    """Return the ratings of all but the rater whom the others are held against."""
+    """Return the ratings of all but the rater to compare the others with."""
     parts = []
     for part in file.parts:
         with placed(file.read["file"]):
@@ -187,23 +188,8 @@ def _categories(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
 
 def _retest(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     """Give how well raters agree with themselves, each and all together."""
+    _check_retest(file)
     by, column = file.read["by"], file.read["session"]
-    refuse(
-        (
-            column is None,
-            "--retest: needs --session with the column of the two sessions",
-        ),
-        (
-            file.parts[0].session is None,
-            f"--retest: compares the sessions of column {column!r}, so --by cannot "
-            "name that column",
-        ),
-        (
-            not file.parts[0].items,
-            "--retest: needs items with names, so it cannot be combined with "
-            "--frequency",
-        ),
-    )
     estimates: list[AgreementRow] = []
     sessions, left_out = {}, []
     for group in dict.fromkeys(part.group for part in file.parts):
@@ -237,6 +223,27 @@ def _retest(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
         estimates=tuple(estimates),
         heads=heads_of("rater" if by is None else f"{by}, rater"),
         notes=(*notes, *left_out),
+    )
+
+
+def _check_retest(file: RatingsFile) -> None:
+    """Refuse a file whose ratings have no two sessions, or no names of items."""
+    column = file.read["session"]
+    refuse(
+        (
+            column is None,
+            "--retest: needs --session with the column of the two sessions",
+        ),
+        (
+            file.parts[0].session is None,
+            f"--retest: compares the sessions of column {column!r}, so --by cannot "
+            "name that column",
+        ),
+        (
+            not file.parts[0].items,
+            "--retest: needs items with names, so it cannot be combined with "
+            "--frequency",
+        ),
     )
 
 
@@ -478,7 +485,7 @@ def _limits(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     rows_of = _of_pairs if of_what == "once" else partial(_of_more, of_what)
     answer = _table(name, file, partial(rows_of, questions, panels))
     pairs = (
-        f"{row['first']} less {row['second']}"
+        f"{row['first']} minus {row['second']}"
         for row in answer.rows
         if "first" in row and of_what != "ratio"
     )
@@ -612,8 +619,6 @@ def _of_line(limits: RepeatedLimits) -> list[tuple[str, float, Interval]]:
 
 def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     """Give raters, pairs, categories and confusions of every part of the ratings."""
-    from masrel.intervals.diagnosis import diagnose
-
     if questions.coefficients is None and questions.metric is None:
         questions = replace(questions, coefficients=["fleiss_kappa"])
     refuse(
@@ -624,19 +629,7 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     )
     (entry,) = entries(questions, file, file.parts)
     title, grades = questions.title(entry), file.scale.grades
-    parts = []
-    for part, group, keys in parts_of(file):
-        with placed(file.read["file"], group):
-            result = diagnose(
-                on_grades(code_ratings(part.ratings), entry, file),
-                coefficient=entry,
-                target=None if questions.target is None else "items",
-                raters=part.raters,
-                reference=questions.reference,
-                weights=questions.weights_of(entry),
-                level=questions.level,
-            )
-        parts.append((group, keys, result, _diagnosis_rows(grades, result)))
+    parts = [*_diagnoses(file, entry, questions)]
     notes = _diagnosis_notes([result for *_, result, _ in parts], title, questions)
     by = ", ".join(part_names(file, file.parts[0]))
     of = {
@@ -674,14 +667,30 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
         )
 
 
+def _diagnoses(
+    file: RatingsFile, entry: "Coefficient", questions: Questions
+) -> Iterator[tuple[str, Row, "Diagnosis", dict[str, list[Row]]]]:
+    """Give the group and keys of every part, its diagnosis, and the rows of that."""
+    from masrel.intervals.diagnosis import diagnose
+
+    for part, group, keys in parts_of(file):
+        with placed(file.read["file"], group):
+            result = diagnose(
+                on_grades(code_ratings(part.ratings), entry, file),
+                coefficient=entry,
+                target=None if questions.target is None else "items",
+                raters=part.raters,
+                reference=questions.reference,
+                weights=questions.weights_of(entry),
+                level=questions.level,
+            )
+        yield group, keys, result, _diagnosis_rows(file.scale.grades, result)
+
+
 def _diagnosis_rows(grades: Sequence[str], result: "Diagnosis") -> dict[str, list[Row]]:
     # of each table
     raters, scale = np.array(result.raters), np.array(grades)
     pair = np.triu_indices(len(raters), 1)
-    rater, of, graded = np.indices(result.confusion.shape)
-    n_rated = result.confusion.sum(axis=2)
-    met = np.nonzero(n_rated)  # else there is nothing to tell
-    shares = zip(grades, result.shares[met].T, strict=True)
     return {
         "raters": _rows(
             rater=raters,
@@ -710,6 +719,19 @@ def _diagnosis_rows(grades: Sequence[str], result: "Diagnosis") -> dict[str, lis
             low=result.category_low,
             high=result.category_high,
         ),
+        **_confusion_rows(raters, scale, result),
+    }
+
+
+def _confusion_rows(
+    raters: NDArray[Any], scale: NDArray[Any], result: "Diagnosis"
+) -> dict[str, list[Row]]:
+    # as the JSON has them, and as they are shown
+    rater, of, graded = np.indices(result.confusion.shape)
+    n_rated = result.confusion.sum(axis=2)
+    met = np.nonzero(n_rated)  # the others have no shares
+    shares = zip(scale, result.shares[met].T, strict=True)
+    return {
         "confusion": _rows(
             rater=raters[rater],
             of=scale[of],
@@ -719,7 +741,7 @@ def _diagnosis_rows(grades: Sequence[str], result: "Diagnosis") -> dict[str, lis
             low=result.share_low,
             high=result.share_high,
         ),
-        # a row a rater and grade of another, a column a grade
+        # one row per rater and grade of another rater, one column per grade
         "confusion_shown": _rows(
             rater=raters[met[0]],
             of=scale[met[1]],

@@ -119,8 +119,8 @@ def read_gate(
     parts = _PARTS.fullmatch(text)
     if parts is None:
         raise ParameterError(
-            f"{where}: needed a name, a dot and a number of it, one of >=, <=, >, <, "
-            f"and a limit, such as {example}, got {text!r}"
+            f"{where}: needed a name, a dot, one of its numbers, one of >=, <=, >, "
+            f"<, and a limit, such as {example}, got {text!r}"
         )
     name, comparison, limit = parts.groups()
     estimate, _, number = name.strip().rpartition(".")

@@ -1,4 +1,4 @@
-"""What is asked about the judges among the raters of a file."""
+"""Questions about the judges among the raters of a file."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -67,7 +67,7 @@ class Judging:
 
     @property
     def margin(self) -> float | None:
-        """ε; None where judges are not held against humans."""
+        """ε; None if judges are not compared with humans."""
         if self.annotators is None:
             return self.epsilon
         from masrel.judges import EPSILONS

@@ -1,4 +1,4 @@
-"""What a paper prints of an agreement, checked; and files with one claim a row.
+"""Claims: what a paper reports about agreement, and files with one claim per row.
 
 Every value between the ends of an interval is printed as the same text, and whether the
 ends are as well depends on the rule for ties. All is exact: ends are fractions.
@@ -112,7 +112,7 @@ def whole_numbers(bounds: Bounds) -> Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """What a paper prints, as it prints it; what it does not print is left out.
+    """What a paper reports about agreement, as it is printed.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def _is_whole(count: object) -> bool:
 
 
 def read_claims(file: Path) -> tuple[Claim, ...]:
-    """Read a CSV file of claims, one a row.
+    """Read a CSV file with one claim per row.
 
     Parameters
     ----------

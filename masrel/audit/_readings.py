@@ -1,4 +1,4 @@
-"""How many tables give what is printed, by every reading of it.
+"""Readings of a claim: how many tables give the printed numbers under each.
 
 What a program prints as the standard error of kappa is one of several; the interval is
 kappa plus and minus a normal quantile of it, and p that of kappa over it. All these are
@@ -133,7 +133,7 @@ def count_text(n_tables: int | None, status: CountStatus) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClaimAudit:
-    """What became of a claim.
+    """The result of checking a claim.
 
     Attributes
     ----------
@@ -331,7 +331,7 @@ def _reading(
 
 
 def audit_claim(claim: Claim) -> ClaimAudit:
-    """Count the tables that give what a paper prints, by every reading of it.
+    """Count the tables that give the printed numbers, under every reading.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Options that several verbs have, as one argument each, and what verbs print."""
+"""Options that several commands share, and what commands print."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Files that a call names: what is written is never what is read, nor a record."""
+"""Paths that a call names: no output overwrites an input or a record."""
 
 import os
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The options of verbs that read any file of ratings, and what they say of it."""
+"""Options of the commands that read a file of ratings, and how they report it."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""``masrel agree``: agreement of any file of ratings, no study needed."""
+"""``masrel agree``: agreement of the raters in a file."""
 
 import click
 

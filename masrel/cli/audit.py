@@ -88,11 +88,12 @@ _WEIGHTS = click.Choice(["identity", "linear", "quadratic", "any"])
 def audit(
     source: Path | None, output: OutputOptions, **printed: str | tuple[str, str] | None
 ) -> None:
-    """Say which tables give the agreement that a paper prints, by every reading of it.
+    """Find the tables that give the agreement that a paper reports.
 
-    What is printed comes as options, or SOURCE is a CSV file with a claim a row, or a
-    study that has such a file, ratings/claims.csv. No table at all means that the
-    numbers cannot belong together as they were read; it does not say why.
+    Give the printed numbers as options, or as SOURCE: a CSV file with one row per
+    claim, or a study that has such a file, ratings/claims.csv. Every way to read the
+    numbers is tried. If no table fits, the numbers as read cannot belong together; the
+    reason is unknown.
     """
     # printed: what the options say, by the parameters of a claim
     texts = {name: text for name, text in printed.items() if text is not None}

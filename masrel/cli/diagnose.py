@@ -1,4 +1,4 @@
-"""``masrel diagnose``: which rater, pair and category agreement is lost by."""
+"""``masrel diagnose``: the raters, pairs and categories that disagree."""
 
 import click
 

@@ -120,12 +120,11 @@ def gstudy(
     output: OutputOptions,
     **of_intervals: Any,
 ) -> None:
-    """Say where the variance of the ratings in FILE lies, and what would be reliable.
+    """Estimate where the variance of the ratings in FILE lies and what is reliable.
 
-    FILE has one row a rating, with columns for what is measured (--item), for facets
-    and for grades. Components of variance with intervals, the reliability of designs
-    with other numbers of levels, and of single ratings: of the same rater, say, and of
-    different ones.
+    FILE has one row per rating, with columns for what is measured (--item), for facets
+    and for grades. The command gives components of variance with intervals, and the
+    reliability of single ratings and of designs with other numbers of levels.
     """
     refuse(
         (

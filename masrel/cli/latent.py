@@ -70,9 +70,10 @@ def latent(
 ) -> None:
     """Place the raters and items in FILE on one scale.
 
-    FILE holds grades on an ordered scale, in any shape that agree reads. An ordinal
-    latent-trait model gives kappa for new raters, each rater's bias and noise, each
-    item's severity, and the thresholds between grades. It takes seconds to minutes.
+    FILE can be any file that masrel agree reads; its grades must be in order. An
+    ordinal latent-trait model gives kappa for new raters, each rater's bias and noise,
+    each item's severity, and the thresholds between grades. This takes seconds to
+    minutes.
     """
     refuse((seed < 0, f"--seed: needs at least 0, got {seed}"))
     ratings = read_file(file, replace(reading, stream=False))

@@ -1,4 +1,4 @@
-"""``masrel limits``: between which limits the measurements of two raters differ."""
+"""``masrel limits``: limits of agreement of raters who measured the same items."""
 
 import click
 

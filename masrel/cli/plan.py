@@ -162,12 +162,12 @@ _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
     quiet="Do not show progress.",
 )
 def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) -> None:
-    """Say how large a study must be, or what STUDY can show.
+    """Find how large a study must be, or what STUDY can show.
 
-    With --items or --raters alone, the other is solved for; with both, a study of that
-    size is described; with --prices and neither, the cheapest is solved for. Ranges
-    make a grid. STUDY is a folder with a protocol: each line of its plan is described
-    at its size. masrel plan --judge --help: items for a judge, such as a model.
+    If only --items or --raters is given, the other is solved for. If both are given, a
+    study of that size is described. With --prices and neither, the cheapest study is
+    found. Ranges make a grid. STUDY is a folder with a protocol: each line of its plan
+    is described at its size. For a judge, such as a model: masrel plan --judge --help.
     """
     arguments = {key: value for key, value in options.items() if value is not None}
     if "error" in arguments:

@@ -34,8 +34,8 @@ from masrel.cli._options import (
 )
 @click.option("--seed", "rng", default=0, show_default=True)
 @click.option("--rate", type=float, help="Expected rate, instead of --epsilon.")
-@click.option("--sensitivity", type=float, help="Of the judge, for --rate.")
-@click.option("--specificity", type=float, help="Of the judge, for --rate.")
+@click.option("--sensitivity", type=float, help="Sensitivity of the judge, for --rate.")
+@click.option("--specificity", type=float, help="Specificity of the judge, for --rate.")
 @click.option("--half-width", type=float, help="Half-width of the interval of --rate.")
 @click.option(
     "--level", default=0.95, show_default=True, help="Level of this interval."
@@ -52,12 +52,13 @@ from masrel.cli._options import (
     "prints nothing else."
 )
 def plan_judge(output: OutputOptions, **options: Any) -> None:
-    """Say how many items must be labelled for a judge.
+    """Find how many items must be labelled for a judge.
 
-    With --epsilon: how many items a judge and the humans must all grade, so that it
-    passes the alternative annotator test of masrel judge as often as --power says, by
-    1000 simulated studies. With --rate: how many of --items need a label, so that the
-    rate corrected for the judge is known to --half-width.
+    With --epsilon, the command gives the number of items that a judge and the humans
+    must all grade for the judge to pass the alternative annotator test of masrel judge
+    with the probability --power, from 1000 simulated studies. With --rate, it gives the
+    number of --items that need a label for an interval of ± --half-width around the
+    rate, corrected for the judge's errors.
     """
     needed = {
         "epsilon": ("n_humans", "accuracy"),

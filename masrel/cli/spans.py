@@ -79,11 +79,11 @@ def spans(
     output: OutputOptions,
     **columns: str | None,
 ) -> None:
-    """Say how far observers mark the same spans in FILE.
+    """Measure how well observers agree on the spans in FILE.
 
-    FILE is a table with a span a row, an export of Label Studio (--from), or a folder
-    of brat, with a folder of each annotator. Krippendorff's unitizing alpha is of all
-    observers together, F1 of every two.
+    FILE is a table with one row per span, an export of Label Studio (--from), or a
+    folder of brat with one folder per annotator. Krippendorff's unitizing alpha is for
+    all observers together, F1 for every two.
     """
     from masrel.analysis._file_estimates import placed
     from masrel.analysis._file_spans import span_answer

@@ -1,4 +1,4 @@
-"""Intervals for agreement coefficients: what was sampled is asked, never guessed.
+"""Intervals for agreement coefficients, for the population that `target` names.
 
 In: a coefficient's name, its ratings, and the `target` population. Out: an
 `Interval`. scipy and emcee load only when a method needs them.

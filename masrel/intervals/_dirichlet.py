@@ -1,4 +1,4 @@
-"""Posteriors that are drawn: of any coefficient, by any number of raters.
+"""Drawn posteriors of any coefficient, for any number of raters.
 
 Raters alike: ρ and the shares of the categories are drawn from their posterior in the
 Dirichlet-multinomial model, and give the chance of any two ratings of an item.

@@ -180,10 +180,8 @@ class IntervalProblem:
     ) -> Interval:
         """Return a confidence interval, cut at the ends of the parameter space."""
         if low < self.min_value - ROUNDING or high > 1.0 + ROUNDING:
-            notes = (
-                *notes,
-                f"the interval was cut at {self.min_value:g} or 1",
-            )
+            lowest = f"{self.min_value:g} or " * math.isfinite(self.min_value)
+            notes = (*notes, f"the interval was cut at {lowest}1")
         return Interval(
             # resamples of items and raters can leave both ends below the space
             low=min(max(low, self.min_value), 1.0),
@@ -398,7 +396,7 @@ def cluster_codes(problem: IntervalProblem, clusters: object) -> Integers:
         ),
         (
             len(labels) != n_items,
-            f"clusters: needs one label per item, {n_items}, got {len(labels)}",
+            f"clusters: needs a label for each of {n_items} items, got {len(labels)}",
         ),
     )
     numbers: dict[Hashable, int] = {}

@@ -75,7 +75,7 @@ class Prior:
         refuse(
             (
                 not (is_number and 0.0 < concentration <= _SUREST),
-                f"concentration: needs more than 0 and at most {_SUREST:g}, got "
+                f"concentration: needs a number above 0 and at most {_SUREST:g}, got "
                 f"{concentration!r}",
             )
         )

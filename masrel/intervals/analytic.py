@@ -166,7 +166,7 @@ def analytic(
         ),
         (
             clusters is not None and convention is not None,
-            f'clusters: needs no convention, got "{convention}"',
+            f'clusters: cannot be combined with a convention, got "{convention}"',
         ),
     )
     return _with_error(problem, weights, distribution, convention, clusters)[1]
@@ -338,8 +338,8 @@ def _error_by(
     if function is None or (function is _null and not problem.unweighted):
         with_weights = "" if function is None else " with weights"
         raise ParameterError(
-            f'convention: "{convention}" has no error for '
-            f"{problem.entry.title}{with_weights}; it has one for "
+            f'convention: "{convention}" has no standard error for '
+            f"{problem.entry.title}{with_weights}, only for "
             f"{', '.join(_ERRORS[convention])}"
         )
     is_defined = estimate.reason is None and estimate.n_items > 1

@@ -1,6 +1,6 @@
-"""An estimate with the interval that its question and its size call for.
+"""An estimate with the interval chosen for its target and its size.
 
-Which covers best is known from the study of coverage in the docs.
+The choice follows the study of coverage in the docs.
 
 Other items. A posterior covers best where there are
 
@@ -440,7 +440,7 @@ def _other_items_and_raters(
     df = min(problem.n_paired_items, problem.n_paired_raters) - 1
     if df < 1:
         nothing = problem.undefined(
-            "one item with two ratings does not say how items differ",
+            "one item with two ratings does not show how items differ",
             method="items and raters left out",
             unit="both",
         )

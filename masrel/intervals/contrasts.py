@@ -1,4 +1,4 @@
-"""Differences of coefficients: between ratings of the same items, or of others.
+"""Differences of coefficients between ratings of the same or of different items.
 
 One engine: the coefficient of every set of ratings without each item, or each cluster.
 How these move together is the jackknife's covariance of the coefficients: a difference
@@ -63,7 +63,7 @@ def difference(
     level: float = 0.95,
     clusters: object = None,
 ) -> Estimate:
-    """Estimate how much a coefficient of some ratings exceeds that of others.
+    """Estimate the difference of a coefficient between two sets of ratings.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def difference(
     Returns
     -------
     Estimate
-        First less second, with its jackknife standard error over items and its
+        First minus second, with its jackknife standard error over items and its
         interval by Student's t, which generalises to other items: n - 1 degrees for the
         same items, n those with a pair of ratings in the set that has fewer of them;
         Satterthwaite's for independent ones. `observed` and `chance` are differences,
@@ -172,7 +172,7 @@ def difference_test(
     weights: "WeightsLike" = "identity",
     clusters: object = None,
 ) -> Significance:
-    """Test whether a coefficient is the same of some ratings as of others.
+    """Test whether a coefficient is the same for two sets of ratings.
 
     Parameters
     ----------
@@ -386,7 +386,7 @@ def _covariance(without: Floats, n: int) -> Floats:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Differences:
-    """How several coefficients of the same items differ, each two of them.
+    """Differences of every two of several coefficients of the same items.
 
     Attributes
     ----------
@@ -399,7 +399,7 @@ class Differences:
     correlation : ndarray, shape (n_sets, n_sets)
         How the coefficients are correlated.
     values : ndarray, shape (n_sets, n_sets)
-        The coefficient of the row less that of the column.
+        The coefficient of the row minus that of the column.
     errors : ndarray, shape (n_sets, n_sets)
         Standard errors of these.
     low, high : ndarray, shape (n_sets, n_sets)

@@ -1,4 +1,4 @@
-"""Which rater, which pair of raters, which category: where agreement is lost."""
+"""Diagnosis of disagreement: by rater, by pair of raters, and by category."""
 
 import itertools
 import math
@@ -43,7 +43,7 @@ class Diagnosis:
     categories : tuple of str, int or float
         The scale.
     reference : str or None
-        The rater that the others are held against, if there is one.
+        The rater with whom the others are compared, if there is one.
     level : float
         Level of the intervals.
     pair_values, pair_low, pair_high : ndarray, shape (n_raters, n_raters)
@@ -141,7 +141,7 @@ def diagnose(
     metric: Metric | None = None,
     level: float = 0.95,
 ) -> Diagnosis:
-    """Say which rater, which pair and which category agreement is lost on.
+    """Find the raters, pairs of raters and categories that disagree.
 
     Parameters
     ----------
@@ -152,12 +152,12 @@ def diagnose(
         function.
     target : {"items"}, optional
         "items" for intervals that generalise to other items, graded by these raters;
-        without it there are none. What a pair or a rater does says nothing of others.
+        without it there are none. Each interval is for one pair or rater alone.
     raters : sequence of str, optional
         What the raters are called; the columns of a DataFrame, else their places.
     reference : str or int, optional
-        Name, or place, of a rater who is right: the others are held against this one,
-        who is then left out of all else.
+        Name, or place, of a rater who is right: the others are compared with this one,
+        who is then left out of all other estimates.
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional

@@ -23,7 +23,7 @@ _Model = Literal["auto", "dirichlet-multinomial", "table", "patterns"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """One unknown of a model after the data.
+    """The posterior of one unknown of a model.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Raters who agree with themselves, each to a degree of his or her own.
+"""Raters' agreement with themselves, which may differ from rater to rater.
 
 A rater of self-agreement κ and category shares π grades an item k and then l with
 probability κ π_k [k = l] + (1 - κ) π_k π_l. Over raters κ ~ Beta with mean m and
@@ -81,7 +81,7 @@ def retest_model(
     prior: PriorName = "uniform",
     concentration: float = 1.0,
 ) -> RetestModel:
-    """Estimate raters' agreement with themselves, each pulled towards the others.
+    """Estimate raters' agreement with themselves, each shrunk towards the others.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ class ScoreTest:
 def score_test(
     b: int, c: int, n: int, *, delta: float = 0.0, level: float = 0.95
 ) -> ScoreTest:
-    """Test how much more items go one way than the other, by Tango's score.
+    """Test and estimate the difference of two paired shares, by Tango's score.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The alternative annotator test: whether a judge may stand for a human.
+"""The alternative annotator test: whether a judge can replace a human.
 
 In: grades of humans and of a judge, by item. Out: how often the judge is at least as
-near to the other humans as each of them is, tests of that, and intervals.
+close to the other humans as each of them is, tests of that, and intervals.
 """
 
 import math
@@ -84,7 +84,7 @@ _AT_THE_END = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HumanBesideJudge:
-    """One human and the judge, each held against the other humans.
+    """One human and the judge, both compared with the other humans.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class HumanBesideJudge:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlternativeAnnotatorTest:
-    """Whether a judge may stand for one of the humans.
+    """Whether a judge can replace one of the humans.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class AlternativeAnnotatorTest:
     level : float
         Bound of the expected share of false rejections.
     thresholds : tuple of float
-        What the smallest p-value, the next, … are held against.
+        Thresholds of the smallest p-value, the next, and so on.
     min_items : int
         Items from which on a human is tested.
     """
@@ -186,7 +186,7 @@ def alternative_annotator_test(
     level: float = 0.05,
     clusters: Grades | None = None,
 ) -> AlternativeAnnotatorTest:
-    """Test whether a judge may stand for a human, each human held against the others.
+    """Test whether a judge can replace a human: the alternative annotator test.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ class _Graded:
         """Return 1 where a human is nearer to the others, -1 where a judge is."""
         # -> (n_judges, n_items, n_humans); whole numbers are exact, of any size
         every = range(len(self.names))
-        of_humans: Any = sum(  # nobody is held against himself
+        of_humans: Any = sum(  # nobody is compared with himself
             self._to(k, self.humans) * (np.array(every) != k) for k in every
         )
         by_human = np.stack([self._to(k, self.judges) for k in every], axis=-1)
@@ -427,8 +427,8 @@ def _graded(
     refuse(
         (
             not does_count.any(),
-            f"{listed(judges)}: needs items that two humans have graded, too; there "
-            f"are none among {len(items)}, such as {shown(next(iter(items), None))}",
+            f"{listed(judges)}: needs items that two humans have graded, too; found "
+            f"none among {len(items)}, such as {shown(next(iter(items), None))}",
         ),
         error=RatingsError,
     )
@@ -541,7 +541,7 @@ def advantage(
     level: float = 0.95,
     clusters: Grades | None = None,
 ) -> Estimate:
-    """Estimate how often a judge is at least as near to humans as one of them is.
+    """Estimate how often a judge is at least as close to the humans as one of them.
 
     Parameters
     ----------
@@ -586,9 +586,9 @@ def advantage(
 
     Notes
     -----
-    A human who is left out is not held against the judge, and nobody is held against
-    this human. For "both" the variances are added; the degrees of freedom are the
-    fewer of those of items, of the human who has the fewest, and of humans.
+    A human who is left out is not compared with the judge, nor others with this human.
+    For "both" the variances are added; the degrees of freedom are the fewest of those
+    of items, of the human who has the fewest, and of humans.
 
     References
     ----------
@@ -651,7 +651,7 @@ class JudgeDifference:
     first, second : str
         The judges.
     value : float
-        Advantage of the first less that of the second.
+        Advantage of the first minus that of the second.
     standard_error : float
         By the jackknife; ``nan`` when undefined.
     interval : Interval
@@ -875,7 +875,7 @@ def _without_humans(graded: _Graded, target: Target) -> Floats:
         )
     )
     rest = []
-    for j in tested:  # whom nobody is held against then
+    for j in tested:  # whom nobody is compared with then
         rated = graded.rated & (np.arange(len(graded.names)) != j)
         rated &= rated.sum(axis=1, keepdims=True) >= 2
         rest.append(replace(graded, rated=rated))
@@ -893,7 +893,7 @@ def reference_difference(
     epsilon: float = 0.0,
     level: float = 0.95,
 ) -> ScoreTest:
-    """Compare how often a judge and one human have the grade of a reference.
+    """Compare how often a judge and one human give the grade of a reference.
 
     Parameters
     ----------
@@ -946,7 +946,10 @@ def reference_difference(
     _, codes, _ = _coded(places, list(places))
     codes = codes[(codes >= 0).all(axis=1)]
     refuse(
-        (not len(codes), "reference: needs items that human and judge graded, too"),
+        (
+            not len(codes),
+            "reference: needs items that the human and the judge graded, too",
+        ),
         error=RatingsError,
     )
     of_human, of_judge = codes[:, 0] == codes[:, 2], codes[:, 1] == codes[:, 2]

@@ -1,4 +1,4 @@
-"""Who is right where nobody knows: classes of items from raters alone.
+"""Classes of items and errors of raters, without a gold standard.
 
 In: grades of several raters, without a gold standard. Out: how common each class is,
 each rater's confusion matrix, the class of each item; and how many independent judges
@@ -343,7 +343,7 @@ def _other_starts(
     if gain <= _HIGHER:
         return None, notes
     note = (
-        f"this is this is not the highest maximum: {n_higher} of {_N_STARTS} other "
+        f"this is not the highest maximum: {n_higher} of {_N_STARTS} other "
         f"starts end higher, the best by {gain:.3g} in log-likelihood"
     )
     return other, (note, *notes)
@@ -587,7 +587,7 @@ def _count_switches(confusion: Floats, drawn: Floats) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EffectiveNumber:
-    """How many independent judges several judges are worth who err together.
+    """How many independent judges several judges with related errors are worth.
 
     Attributes
     ----------

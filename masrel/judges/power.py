@@ -1,7 +1,7 @@
-"""How many items it takes to show that a judge may stand for a human.
+"""Number of items needed to show that a judge can replace a human.
 
 In: how often humans and judge are right. Out: how often the judge passes the
-alternative annotator test, and the items from which on that is often enough.
+alternative annotator test, and how many items make that often enough.
 """
 
 import math
@@ -65,7 +65,7 @@ def judge_plan(
     power: float = 0.8,
     rng: np.random.Generator | int | None = None,
 ) -> JudgePlan:
-    """Return the items for which a judge passes often enough, or how often it does.
+    """Return the number of items a judge needs to pass, or how often it passes.
 
     Parameters
     ----------

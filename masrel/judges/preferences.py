@@ -34,7 +34,7 @@ _MAX_STEPS, _SETTLED = 500, 1e-12  # of Newton's method
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PositionBias:
-    """How far the order of two answers decides which of them is preferred.
+    """How much the order of two answers affects which one is preferred.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class PositionBias:
         tie, the other wins) and in the swapped order (columns: the same model wins,
         tie, the other wins). Above the diagonal the first position gains.
     value : float
-        Share of pairs in which the first position gains, less that of the second.
+        Share of pairs in which the first position gains, minus that of the second.
     low, high : float
         Its interval, by Tango's score test.
     level : float
@@ -188,7 +188,7 @@ def _read(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BradleyTerry:
-    """Strengths of models by which of two is preferred.
+    """Strengths of models, from preferences between two of them.
 
     Attributes
     ----------

@@ -437,7 +437,7 @@ def rate_estimates(
 def label_allocation(
     m: int, rate: float, *, sensitivity: float, specificity: float, pilot: int
 ) -> float:
-    """Return how many of the items to label are best positives.
+    """Return how many of the items to label should be positives.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Pages that need nothing beside themselves: of a document, and of answers."""
+"""Self-contained HTML pages of documents and of answers."""

@@ -1,4 +1,4 @@
-"""The page of what was asked of a file of ratings.
+"""The page of answers to questions about a file of ratings.
 
 In: the ratings, the questions and their answers. Out: one HTML page with the result,
 its tables and pictures, items to discuss, methods to paste, and what repeats it.

@@ -1,4 +1,4 @@
-"""How estimates were made, in sentences for a paper, written from what was computed."""
+"""Methods texts for a paper: how the estimates were computed."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""The pictures that ratings have, each a row: when it can be drawn, and of what.
+"""Pictures of ratings: when each can be drawn, and from what.
 
 In: the ratings of a part of a file, and what was answered of them. Out: drawings with
 captions, for a page or for axes.

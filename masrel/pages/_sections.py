@@ -1,4 +1,4 @@
-"""A document of sections, as a page that needs nothing beside itself.
+"""A document of sections as a self-contained page.
 
 In: sections of paragraphs, tables, pictures and references. Out: HTML.
 """

@@ -46,7 +46,7 @@ _STEPS = ((15, 3), (30, 4), (60, 6), (120, 8), (250, 12), (500, 20), (1000, 40))
 
 
 def precision(study: Study, *, progress: Progress | None = None) -> Plan:
-    """Say what a study of a given size can show.
+    """Compute what a study of a given size can show.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def plan_grid(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> tuple[Plan, ...]:
-    """Say what studies of many sizes, and under several truths, can show.
+    """Compute what studies of many sizes can show, under several true values.
 
     Parameters
     ----------
@@ -455,9 +455,9 @@ class _Search:
         refuse(
             (
                 n in (0, self.highest),
-                f"max_cost: needs a limit between {self.cost(self.lowest):g}, the "
-                "cost of the smallest study, and the cost of some study, got "
-                f"{limit:g}",
+                f"max_cost: needs a limit from {self.cost(self.lowest):g}, the cost of "
+                f"the smallest study, to below {self.cost(self.highest):g}, the cost "
+                f"of the largest, got {limit:g}",
             )
         )
         return n

@@ -1,4 +1,4 @@
-"""A study to be planned, as it is declared; the plan that comes of it; and a pilot."""
+"""A study to be planned, the plan that results, and a pilot."""
 
 import itertools
 import math
@@ -463,7 +463,7 @@ def check_aim(study: Study, *, is_solved: bool) -> None:
         ),
         (
             power is None and null is not None,
-            f"null: needs power, got null {null} without",
+            f"null: needs power as well, got only null {null}",
         ),
         (
             study.assurance is not None and not has_aim(study),
@@ -482,7 +482,7 @@ def check_aim(study: Study, *, is_solved: bool) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pilot:
-    """A pilot, as a plan takes it.
+    """What a pilot study says about the study that is planned.
 
     Attributes
     ----------
@@ -511,7 +511,7 @@ def pilot(
     categories: Sequence[Label] | None = None,
     level: float = 0.95,
 ) -> Pilot:
-    """Return what a pilot's ratings say of the study that is planned.
+    """Return what a pilot's ratings say about the study that is planned.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What figures show, as plain values: they load nothing that draws."""
+"""Values that figures show; they load no drawing library."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal

@@ -71,9 +71,9 @@ _MARK: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.2, "zorder": 0.9}
 _Part = Literal["density", "stems", "bars"]
 _Ridge = dict[_Part, tuple[Floats, Floats]]
 _PARTS: dict[_Part, tuple[str, str]] = {  # colour, and name in the legend
-    "density": (ORANGE, "posterior density, each to its own height"),
-    "stems": (BLUE, "resamples of one value, each row to its own height"),
-    "bars": (BLUE, "resamples together in bars, each row to its own height"),
+    "density": (ORANGE, "posterior density, scaled in each row"),
+    "stems": (BLUE, "resamples by value, scaled in each row"),
+    "bars": (BLUE, "resamples in bars, scaled in each row"),
 }
 _ALPHA = 0.35
 _STEM: dict[str, Any] = {  # in the legend

@@ -128,8 +128,8 @@ def confusion(
     refuse(
         (
             n < 2 or (reference is None and n > 2),
-            "ratings: needs two raters, or a reference that several others are held "
-            f"against, got {counted(n, 'rater')}",
+            "ratings: needs two raters, or a reference to compare several others "
+            f"with, got {counted(n, 'rater')}",
         )
     )
     row = 0 if reference is None else _place(reference, names)
@@ -167,7 +167,7 @@ def confusion_picture(
     used = np.flatnonzero(counts.sum(axis=0) + counts.sum(axis=1)).tolist()
     if len(grades) > _MAX_SHADES and 0 < len(used) < len(grades):
         counts, grades = counts[np.ix_(used, used)], [grades[k] for k in used]
-        label += "\ngrades never met are left out"
+        label += "\nunused grades are left out"
     return counts_picture(counts, grades, grades, np.eye(len(grades)), names, label)
 
 
@@ -398,7 +398,7 @@ def categories_picture(
         axes.grid(axis="x")
         rows_of_shares(
             *(axes, grades, texts, cell),
-            "share of a grade's ratings that meet\nthe same of another rater",
+            "share of ratings with this grade\nthat another rater matched",
         )
         legend_below(axes, marks if np.isfinite(low).any() else (), ncols=2)
 

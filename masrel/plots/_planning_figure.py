@@ -1,4 +1,4 @@
-"""What studies can show, over how many items, or raters, they have."""
+"""What studies can show, by number of items or raters."""
 
 from collections.abc import Sequence
 

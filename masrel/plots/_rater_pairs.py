@@ -1,4 +1,4 @@
-"""Every two raters as a heatmap of cells, what each adds, and parts of the variance."""
+"""Agreement of every two raters as a heatmap, and parts of the variance."""
 
 import math
 from collections.abc import Sequence
@@ -87,7 +87,7 @@ def components_picture(parts: VarianceComponents) -> Picture:
     """Return the variances as shares of their sum, with standard deviations."""
     total = parts.items + parts.raters + parts.residual or math.nan
     negative = " and ".join(parts.negative)
-    note = f"{negative}: less than 0 by mean squares, taken as 0"
+    note = f"{negative}: estimated below 0, shown as 0"
     if math.isnan(total):
         note = f"undefined: {parts.reason or 'all ratings are alike'}"
     elif not negative:

@@ -1,4 +1,4 @@
-"""What looks as if it were something else: columns and rows that are no ratings.
+"""Doubts: columns and rows that may not be ratings.
 
 In: a sheet, which column is what, and the grades. Out: warnings. What would make a
 number wrong is refused, unless `--raters` or `--reference` names it.
@@ -74,7 +74,7 @@ _MAX_COMPARED = 2000  # columns that are compared with all others
 _ENOUGH = 3  # ratings of a column that are some grade of another's, if both rate
 _ENOUGH_ROWS, _MANY_CATEGORIES = 4, 15  # of a table that is surely one of counts
 _SHOWN = 5
-_APART = "name or grades, of which none is in common with the others, as it is written"
+_APART = "their names or grades, none of which occurs as written in another column"
 
 
 def doubt_columns(
@@ -261,14 +261,14 @@ def _facts(names: Sequence[str], wrong: set[int], named: set[int]) -> dict[str, 
         [name for k, name in enumerate(names) if (k in wrong) is is_out]
         for is_out in (True, False)
     )
-    ignored = f"--ignore{few(out)} ignores such columns, " * bool(rest and few(out))
+    ignored = f"leave them out with --ignore{few(out)}, or " * bool(rest and few(out))
     is_gold = len(out) == 1 and called_gold(out[0])
-    held = f"; masrel diagnose --reference{few(out)} compares the others with it"
+    gold = f"; masrel diagnose --reference{few(out)} compares the others with it"
     return {
         "columns": listed(out, _SHOWN),
-        "why": "name" if wrong <= named else _APART,
-        "advice": f"{ignored}--raters{few(rest) * (len(rest) > 1)} names those that "
-        f"rate{held * is_gold}",
+        "why": "their names" if wrong <= named else _APART,
+        "advice": f"{ignored}name the raters with --raters"
+        f"{few(rest) * (len(rest) > 1)}{gold * is_gold}",
     }
 
 
@@ -282,8 +282,8 @@ def refuse_named(sheet: Sheet, layout: Layout, options: Reading) -> None:
         raise sheet.refuse(
             "no raters",
             columns=listed(wrong, _SHOWN),
-            why="name",
-            advice=f"--ignore{few(wrong)} ignores such columns",
+            why="their names",
+            advice=f"leave them out with --ignore{few(wrong)}",
         )
 
 
@@ -294,7 +294,9 @@ def _refuse_criteria(sheet: Sheet, names: Sequence[str], alone: set[str]) -> Non
     if 2 * len(columns & alone) >= len(columns):
         return
     firsts = [next(iter(way.items())) for way in ways]
-    if_so = "alone, --by-criterion all" if len(ways) == 1 else "if that is a criterion"
+    if_so = (
+        "only, --by-criterion reads all" if len(ways) == 1 else "if that is a criterion"
+    )
     raise sheet.refuse(
         "criteria",
         first=listed(list(ways[0]), _SHOWN),

@@ -87,7 +87,10 @@ def read_table(data: Any, options: Reading) -> tuple[Sheet, Reading]:
     )
     refuse(
         *(
-            (getattr(options, name), f"--{name}: is of files, got a {facts['format']}")
+            (
+                getattr(options, name),
+                f"--{name}: needed a file, got a {facts['format']}",
+            )
             for name in of_files
         )
     )
@@ -152,7 +155,9 @@ def _arrow(data: Any) -> Any:
         raise _no_table(data, error) from error
     for name, kind in kinds.items():
         if isinstance(kind, narwhals.Object):  # of which Arrow has the address alone
-            raise refusal(_TABLE, "nested cell", column=name, number=1, kind="object")
+            raise refusal(
+                _TABLE, "nested cell", column=name, number=1, kind="Python object"
+            )
     table = frame.to_arrow()
     # codes without a sign, which older versions of pyarrow give to no frame
     coded = {
@@ -191,11 +196,11 @@ def read_typed(
     refuse(
         (
             options.encoding is not None and suffix not in _ENCODED,
-            f"--encoding: needed a file of text, got {facts['format']}, whose is known",
+            f"--encoding: needed text, got {facts['format']}, whose encoding is known",
         ),
         (
             source not in (None, *TOOLS),
-            f"--from: needed {', '.join(TOOLS)}, got {source!r}",
+            f"--from: needed one of {', '.join(TOOLS)}, got {source!r}",
         ),
     )
     is_json = source is None and suffix in (".json", ".jsonl")
@@ -280,7 +285,7 @@ def _workbook(
     if data.startswith(_ZIP):  # not an .xls
         files = unzipped(
             *(name, suffix, data, _MAX_WORKBOOK),
-            "save its sheet as CSV, since a large table of text is read piece by piece",
+            "save its sheet as CSV, so that it can be read in batches",
             r"xl/worksheets/.*\.xml",  # not of .ods
         )
         # errors of formulas, such as #N/A, which calamine gives as empty cells
@@ -574,7 +579,7 @@ def _records(
         )
     else:
         # a log of inspect_ai has summaries beside its samples, which are large
-        is_log, do = source == "inspect-ai", "unpack it and leave files out"
+        is_log, do = source == "inspect-ai", "unpack it and leave out some files"
         most = MAX_UNPACKED * (_MORE if is_log else 1)
         chosen = "samples/.*[.]json" if is_log else r".*\.(jsonl?|csv)"
         files = unzipped(name, suffix or ".zip", data, most, do, chosen)

@@ -1,4 +1,4 @@
-"""What a caller says of a file of ratings, and the texts of what is found in it."""
+"""How a file of ratings is read, and the texts of what is found in it."""
 
 import shlex
 from collections.abc import Iterable, Sequence
@@ -26,18 +26,18 @@ _LONGEST = 60  # letters of a text that it shows
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """How a file of ratings is read; None and () are for the file to tell.
+    """How a file of ratings is read; None and () leave the choice to the file.
 
     Parameters
     ----------
     item : str or tuple of str
         Column of the items; several name an item together.
     rater, grade : str or None
-        Columns of a long table, one row a rating.
+        Columns of a long table, with one row per rating.
     raters, ignore : str or tuple of str
         Columns of a wide table that are raters, and columns that are left aside.
     reference : str or None
-        The rater whom others are held against, whatever the column is called.
+        The rater to compare the others with, whatever the column is called.
     no_item, no_header : bool
         Whether no column names the items; whether the first line is a row.
     skip : int
@@ -168,35 +168,37 @@ class Reading:
         refuse(
             (
                 mark is not None and len(mark) != 1,
-                f"--delimiter: needed auto, one letter, tab or blanks, got {mark!r}",
+                f"--delimiter: needed auto, tab, blanks or one character, got {mark!r}",
             ),
             *(
                 (
                     not isinstance(value, str) or len(value) != 1 or value in _NO_MARKS,
-                    f"--{name}: needed one letter such as a comma, got {value!r}",
+                    f"--{name}: needed one character such as a comma, got {value!r}",
                 )
                 for name in ("decimal", "thousands")
                 if (value := getattr(self, name)) is not None
             ),
             (
                 self.decimal is not None and self.decimal == self.thousands,
-                f"--decimal, --thousands: needed two marks, got {self.decimal!r} twice",
+                "--decimal, --thousands: needed two different marks, got "
+                f"{self.decimal!r}",
             ),
             (
                 self.set_separator is not None
                 and not (isinstance(self.set_separator, str) and self.set_separator),
-                "--set-separator: needed text that stands between labels, got "
+                "--set-separator: needed the text between labels, got "
                 f"{self.set_separator!r}",
             ),
             (
                 self.set_separator and (self.units or self.categories is not None),
-                "--set-separator: makes grades sets of labels, which have no order and "
-                f"no unit, and not {'--units' if self.units else '--categories'}",
+                f"--set-separator, {'--units' if self.units else '--categories'}: "
+                "needed one of them, because sets of labels have no order and no unit, "
+                "got both",
             ),
             (
                 is_counted and (self.units or self.set_separator),
-                f"--{'units' if self.units else 'set-separator'}: is of grades, and "
-                f"cells of --{'counts' if self.counts else 'table'} are numbers of "
+                f"--{'units' if self.units else 'set-separator'}: needed grades, but "
+                f"the cells of --{'counts' if self.counts else 'table'} are numbers of "
                 "ratings",
             ),
             (
@@ -206,8 +208,8 @@ class Reading:
             ),
             (
                 self.stream and self.whole,
-                f"{', '.join(self.whole[:1])}: needs the whole file in memory, and not "
-                "--stream",
+                f"{', '.join(self.whole[:1])}: needs the whole file in memory, so it "
+                "cannot be combined with --stream",
             ),
             (
                 self.counts and self.table,
@@ -215,42 +217,44 @@ class Reading:
             ),
             (
                 self.session and is_counted,
-                "--session: counts do not say who rated what; --by tells groups apart",
+                "--session: counts do not show who rated what; name groups with --by",
             ),
             (
                 self.clusters and is_counted,
-                "--clusters: counts do not say which item is which, so needs ratings",
+                "--clusters: needed ratings, because counts do not show which item is "
+                "which",
             ),
             (
                 self.frequency and (is_long or is_counted or self.session),
-                "--frequency: says how many items a row of a wide table stands for, "
-                "and not with --rater, --grade, --counts, --table or --session",
+                "--frequency: is for tables with one column per rater, so it cannot be "
+                "combined with --rater, --grade, --counts, --table or --session",
             ),
             (
                 self.frequency and (self.clusters or self.repeated != "error"),
-                "--frequency: items that a row stands for have no names, as --clusters "
-                "and --repeated need",
+                "--frequency: cannot be combined with --clusters or --repeated, "
+                "because the items of a row have no names",
             ),
             (
                 self.by_criterion
                 and (is_long or is_counted or self.frequency or self.by),
-                "--by-criterion: groups the columns of a wide table, and not with "
-                "--rater, --grade, --counts, --table, --frequency or --by",
+                "--by-criterion: is for tables with one column per criterion and "
+                "rater, so it cannot be combined with --rater, --grade, --counts, "
+                "--table, --frequency or --by",
             ),
             (
                 self.missing_codes and is_counted,
-                "--missing: names grades that are missing, and cells of "
-                f"--{'counts' if self.counts else 'table'} are numbers of ratings; got "
+                "--missing: needed grades, but the cells of "
+                f"--{'counts' if self.counts else 'table'} are numbers of ratings, got "
                 f"{', '.join(self.missing_codes)}",
             ),
             (
                 self.raters and is_long,
-                "--raters names the columns of a wide table, --rater and --grade those "
-                "of a long one: needed one kind, got both",
+                "--raters is for one column per rater, --rater and --grade are for one "
+                "row per rating: needed one kind, got both",
             ),
             (
                 self.names_at != tuple(n for n in sorted({*self.names_at}) if n > 0),
-                "--skip, --header: needed numbers of lines in order, got "
+                "--skip, --header: needed line numbers in ascending order, got "
                 f"{', '.join(map(str, self.names_at))}",
             ),
             (
@@ -266,7 +270,7 @@ class Reading:
 
 
 class Finding(str):
-    """What is found in a file: a text, with its code and the facts it is made of.
+    """A finding in a file: its text, with its code and facts.
 
     Parameters
     ----------
@@ -313,7 +317,7 @@ def if_missing(texts: Sequence[str]) -> str:
     # an option separates its codes by commas
     if not 0 < len(texts) <= MOST_CODES or any("," in text for text in texts):
         return ""
-    return f"; if that is missing, --missing {quoted(texts)}"
+    return f"; if that means a missing grade, add --missing {quoted(texts)}"
 
 
 def few(names: Sequence[str]) -> str:
@@ -337,205 +341,211 @@ def library(name: str, module: str, extra: str = "files") -> Any:
 
 _TEXTS = {
     # the file
-    "no table": "needed a path, a DataFrame, columns by name, or rows of the same "
-    "length, got {got}",
+    "no table": "needed a path, a DataFrame, columns by name, or rows of equal length, "
+    "got {got}",
     "folder": "needed a file, got a folder",
     "absent": "no such file",
     "device": "needed a file or a pipe, got a device",
-    "empty": "needed a header and rows, the file is empty",
-    "no records": "needed a header and rows, the file has none",
-    "no rows": "needed rows of ratings below the names, got none",
-    "library": "reading it needs {library}: pip install 'masrel[{extra}]'",
-    "damaged": "is damaged, or no {suffix} file ({error})",
-    "members": "needed one file in it, got {n}: {members}; --from says which tool "
-    "exports several",
-    "unpacked": "is more than {most} bytes when unpacked: {do}",
-    "kind": "needed text, got a file of the kind {suffix}",
-    "html": "is HTML, as web programs call .xls, too: open it in a spreadsheet program "
-    "and save it as .xlsx or CSV",
-    "no stream": "--stream: needed a Parquet file, or text in UTF-8 with a separator "
-    "that is no blank, as it stands and not packed, without --transpose, --sheet and "
+    "empty": "needed a header and rows, but the file is empty",
+    "no records": "needed a header and rows, but the file has none",
+    "no rows": "needed rows of ratings below the header, got none",
+    "library": "needs {library}: pip install 'masrel[{extra}]'",
+    "damaged": "is damaged or not a {suffix} file ({error})",
+    "members": "needed one file in the archive, got {n}: {members}; if a tool exported "
+    "them, name it with --from",
+    "unpacked": "is larger than {most} bytes when unpacked: {do}",
+    "kind": "needed text, got a file of type {suffix}",
+    "html": "is HTML, which web programs also save as .xls: open it in a spreadsheet "
+    "program and save it as .xlsx or CSV",
+    "no stream": "--stream: needed a Parquet file, or text in UTF-8 that is not "
+    "compressed and whose separator is not a blank, without --transpose, --sheet and "
     "--from",
     # text
     "encoding": "line {line}: needed {encoding} text, got the byte 0x{byte:02x}; "
-    "--encoding {hint}",
+    "{hint}",
     "zero byte": "line {line}: needed text, got a zero byte{hint}",
     "comment or header": "line {line}: begins with # and has as many cells as the line "
-    "below: take the # away if it is the header, or the line if it is a comment",
-    "two separators": "line 1: needed one separator, {names} both make columns; "
-    "--delimiter chooses",
-    "one column": "line 1: needed columns, got one, {first!r}; --delimiter names the "
-    "separator",
-    "other separator": "line {line}: needed cells with the separator {delimiter}, got "
+    "below: if it is the header, delete the #; if it is a comment, delete the line",
+    "two separators": "line 1: {names} could both be the separator: choose one with "
+    "--delimiter",
+    "one column": "line 1: needed several columns, got one, {first!r}; name the "
+    "separator with --delimiter",
+    "other separator": "line {line}: needed cells separated by {delimiter}, got "
     "{first!r}",
-    "width": "{where}: needed {width} cells, as the first line has, got {n}: {cells!r}",
-    "open quote": "{where}: a quote that is opened is not closed",
-    "names again": "holds the names of the columns a second time: delete that line; "
-    "if the first line is a row like the others, add --no-header",
+    "width": "{where}: needed {width} cells, as in the first line, got {n}: {cells!r}",
+    "open quote": "{where}: a quote is opened but not closed",
+    "names again": "the names of the columns are repeated: delete this line; if the "
+    "first line is a row like the others, add --no-header",
     "no name": "{where}: needed a name for column {column}, got none{hint}",
-    "same name": "{where}: needed different names of the columns that are used, "
-    "{column!r} is there twice{hint}",
-    "titles": "needed names of columns, got {got!r}: {option} takes them from a line "
-    "below",
-    "no line": "--skip, --header: there are no names in {unit} {n} or below",
-    "no lines": "--skip, --header: needed text or a workbook, with names in a line",
-    "note below": "{where} is left out, since it stands alone below an empty one: "
+    "same name": "{where}: needed different names for the columns used, but {column!r} "
+    "occurs twice{hint}",
+    "titles": "needed the names of the columns, got {got!r}: to read them from below, "
+    "add {option}",
+    "no line": "--skip, --header: no names of columns in {unit} {n} or below",
+    "no lines": "--skip, --header: needed text or a workbook; other files have no "
+    "lines of names",
+    "note below": "{where} is left out because it stands alone below an empty one: "
     "{got!r}",
     # workbooks, JSON, exports
     "no cells": "sheet {sheet}: needed a header and rows, got none",
-    "no workbook": "--sheet {sheet}: needed a workbook",
-    "no sheet": "--sheet: there is no sheet {sheet!r}, but {sheets}",
-    "sheets": "needs --sheet with one of its sheets, {sheets}",
-    "nested cell": "column {column!r}, value {number}: needed text or numbers, got a "
-    "{kind}; --from reads exports of annotation tools",
-    "levels": "has names in two levels, and may have its raters in either: --raters"
-    "{raters} if these rate, --transpose if {others} do",
-    "lists": "item {item!r}: needed an annotator of each annotation, got {raters} and "
+    "no workbook": "--sheet {sheet}: needed a workbook, such as .xlsx",
+    "no sheet": "--sheet: there is no sheet {sheet!r}; found {sheets}",
+    "sheets": "has several sheets, {sheets}: choose one with --sheet",
+    "nested cell": "column {column!r}, value {number}: needed text or a number, got a "
+    "{kind}; if a tool exported this file, name it with --from",
+    "levels": "has names at two levels, and either may be the raters: name them with "
+    "--raters{raters}, or add --transpose if they are {others}",
+    "lists": "item {item!r}: needed one grade from each annotator, got {raters} and "
     "{grades}",
-    "no export": "needed .json, .jsonl or .csv in it, got none",
-    "no objects": "needed a JSON list of objects, one a row",
-    "shape": "is no export of {source}, or damaged: a record has another shape "
+    "no export": "needed a .json, .jsonl or .csv file in the archive, got none",
+    "no objects": "needed a JSON list of objects, one per row",
+    "shape": "is damaged or not an export of {source}: a record has another structure "
     "({error})",
-    "sources": "has the keys of more than one tool: {options} says whose it is",
-    "zstd": "is packed by zstd, which pyarrow reads: pip install 'masrel[files]'; or "
-    "inspect log convert --to json makes a log that needs nothing",
-    "inconsistent": "judgements that differ with the order of the answers count as "
+    "sources": "has the keys of more than one tool: choose it with {options}",
+    "zstd": "is compressed with zstd, which needs pyarrow: pip install "
+    "'masrel[files]'; or convert the log with inspect log convert --to json",
+    "inconsistent": "judgements that changed with the order of the answers, counted as "
     "ties: {n}",
     "no fields": "needed labels of whole items, got none; spans, regions and relations "
     "are not read",
-    "fields": "--grade: needed one of its fields, {fields}, got {got}",
+    "fields": "--grade: needed one of the fields {fields}, got {got}",
     "field's name": "--grade: a field cannot be called {chosen!r} here",
-    "no item": "needed an item of every annotation, {rater} gave {got} to none",
-    "no annotator": "item {item}: needed its annotator, got none",
-    "spans": "item {item}: needed a category of the whole, got {got}; spans, regions "
-    "and relations are not read",
-    "several labels": "item {item}: needed one category of each annotator, {rater} "
-    "gave several, {got}, which are not read",
+    "no item": "needed an item for every annotation, but {rater} gave {got} without "
+    "one",
+    "no annotator": "item {item}: needed an annotator, got none",
+    "spans": "item {item}: needed a category of the whole item, got {got}; spans, "
+    "regions and relations are not read",
+    "several labels": "item {item}: needed one category from each annotator, but "
+    "{rater} gave several, {got}",
     "no rating": "needed ratings of {field}, got none",
-    "no role": "needed a column of the {role}, which --{role} names, got {columns}",
-    "no spans": "needed spans that begin and end at numbers: in a table, in an export "
-    "of Label Studio as JSON, or in a folder that has a folder of .ann files of each "
+    "no role": "needed a column with the {role} of each span: name it with --{role}; "
+    "found {columns}",
+    "no spans": "needed numbers for where spans begin and end, in a table, in a JSON "
+    "export of Label Studio, or in a folder with one folder of .ann files per "
     "annotator ({error})",
-    "no step": "needed whole numbers of where spans begin and end; --step 0.001 counts "
-    "seconds in milliseconds",
-    "xpt": "is damaged, or no .xpt file (needed lines of 80 bytes)",
+    "no step": "needed whole numbers for where spans begin and end; --step 0.001 "
+    "counts seconds in milliseconds",
+    "xpt": "is damaged or not an .xpt file (needed lines of 80 bytes)",
     # columns
-    "no column": "{option}: there is no column {column!r}; there are {columns}{hint}",
+    "no column": "{option}: there is no column {column!r}; found {columns}{hint}",
     "two roles": "{options}: needed each column once, got {column!r} twice",
-    "role twice": "{where}: needed one column for the {role}, got {names}: --{role} "
-    "chooses one, --ignore leaves a column aside{hint}",
+    "role twice": "{where}: needed one column for the {role}, got {names}: choose one "
+    "with --{role}, or leave one out with --ignore{hint}",
     "unknown role": "{where}: looks like one row per rating ({known}). Found columns "
     "{columns}: name columns with {needed}; if columns are raters, name them with "
     "--raters; if they are items, add --transpose{hint}",
-    "no rater": "{where}: needed columns of raters, or of categories, got none",
-    "span columns": "{begin!r} and {end!r} look like where spans begin and end, parts "
-    "of a text or a recording, which masrel spans reads; --item names the items, if "
-    "all raters have the same ones",
-    "facets of text": "needed numbers, or --categories with every grade in order, got "
-    "text",
-    "unnamed": "needed the {role}, got {got!r}{hint}",
-    "no value": "needed a value",
-    "contingency": "rows and columns have the same names, so that this looks like a "
-    "contingency table of two raters: --table reads it as one, --raters{names} if a "
-    "row is an item",
-    "no raters": "{columns}: no rater by {why}: {advice}",
-    "criteria": "the columns look like criteria by raters, {first} by {second}: "
-    "{advice}, --raters with all their names takes them for raters",
-    "who rates": "--by-criterion: needs --raters with those who rate: --raters{first} "
-    "or --raters{second}",
-    "no criteria": "--by-criterion: needs columns that are called as tone_Kim, "
-    "tone_Lee, gait_Kim and gait_Lee are, got {columns}",
-    "no criterion": "--by-criterion: {columns}: no columns of all raters, {raters}: "
-    "--ignore{names} leaves them aside, --raters names those who rate",
+    "no rater": "{where}: needed columns of raters or of categories, got none",
+    "span columns": "{begin!r} and {end!r} look like the beginning and end of spans in "
+    "a text or recording, which masrel spans reads; if all raters have the same spans, "
+    "name the items with --item",
+    "facets of text": "needed grades that are numbers, or --categories with every "
+    "grade in order, got text",
+    "unnamed": "needed a name for the {role}, got {got!r}{hint}",
+    "no value": "needed a value, got an empty cell",
+    "contingency": "rows and columns have the same names: if this is a contingency "
+    "table of two raters, add --table; if each row is an item, name the raters with "
+    "--raters{names}",
+    "no raters": "columns that do not look like raters, by {why}: {columns}; {advice}",
+    "criteria": "columns look like combinations of criteria and raters, {first} and "
+    "{second}: {advice}; if every column is a rater, name all of them with --raters",
+    "who rates": "--by-criterion: name the raters with --raters{first} or "
+    "--raters{second}",
+    "no criteria": "--by-criterion: needed names of columns such as tone_Kim, "
+    "tone_Lee, gait_Kim and gait_Lee, got {columns}",
+    "no criterion": "--by-criterion: needed columns of all raters, {raters}, got "
+    "{columns} as well: leave them out with --ignore{names}, or name the raters with "
+    "--raters",
     "other grades": "criterion {criterion!r} has no grade in common with the others: "
-    "it needs to be read by itself, without --by-criterion",
-    "nothing in common": "{one} beside {other}: no grade in common: if they are the "
-    "same grades, write them alike, if others, --raters {names} counts them so",
-    "frequency": "column {column!r} looks like how often each row is there: "
-    "--frequency {name} counts it so; if a row is one item, --ignore {name} together "
-    "with --raters says so",
-    "first column": "{where}: the first column, {column!r}, holds grades like the "
-    "others: --no-item if it is a rater, --item {name} if it names the items",
+    "estimate it separately, without --by-criterion",
+    "nothing in common": "one column has {one}, the other {other}: if these are the "
+    "same grades, spell them alike; if not, add --raters {names}",
+    "frequency": "column {column!r} looks like the number of items that each row "
+    "stands for: if it is, add --frequency {name}; if each row is one item, add "
+    "--ignore {name} and name the raters with --raters",
+    "first column": "{where}: the first column, {column!r}, has the same grades as the "
+    "others: add --no-item if it is a rater, or --item {name} if it names the items",
     "grades as names": "{where}: the names of the columns, {columns}, may be grades: "
-    "--no-header if this line is a row like the others, --raters{names} if they are "
-    "raters",
-    "counts": "rows sum to {total:g}, so that this may be a table of counts, items by "
-    "categories: --counts reads it as one, --raters{names} as raters",
-    "rating as names": "{names} may be a rating: --no-header if this line is a row, "
-    "--header {line} if it has the names",
-    "comments": "{n} different texts in {n_cells} cells are comments, no grades: "
-    "--raters names the columns that rate",
-    "summary row": "{item!r} sums up other rows, or is a comment: delete the line, or "
-    "name the item otherwise",
+    "add --no-header if this line is a row like the others, or name the raters with "
+    "--raters{names} if they are raters",
+    "counts": "rows sum to {total:g}: if this is a table of counts, items by "
+    "categories, add --counts; if the columns are raters, name them with "
+    "--raters{names}",
+    "rating as names": "{names} may be a rating: add --no-header if this line is a "
+    "row, or --header {line} if it has the names of the columns",
+    "comments": "{n} different texts in {n_cells} cells look like comments, not "
+    "grades: name the raters with --raters",
+    "summary row": "{item!r} looks like a summary of other rows or a comment: delete "
+    "the line, or give the item another name",
     # warnings of columns
-    "apart": "no value in common with the other columns: {columns}: {advice}",
+    "apart": "columns with no value in common with the others: {columns}; {advice}",
     "many raters": "{n} columns are read as raters of {n_items} items; if each row is "
     "a rater, add --transpose",
     "second header": "{where} has grades that occur nowhere else: {advice}",
-    "numbered": "no item was rated twice: {columns} may number the rows, --item names "
-    "the column of the items",
+    "numbered": "no item was rated twice: {columns} may only number the rows; name the "
+    "column of the items with --item",
     "alike": "{kind} that differ only in spelling are counted as different: {names}",
-    "summary": "{names} is read as an item; if it is a comment or sums up other rows, "
-    "delete it",
-    "no grade of": "{rater!r} has no grade",
-    "qualtrics": "{first} to {last} are questions and import ids of Qualtrics, no "
-    "ratings: left out",
-    "errors": "errors of formulas in the workbook are read as empty cells: {errors}",
-    "stream": "read as a stream: names of items that differ by spelling alone, or sum "
+    "summary": "read as items: {names}; delete them if they are comments or summaries "
+    "of other rows",
+    "no grade of": "rater {rater!r} gave no grade",
+    "qualtrics": "{first} to {last} are left out because they have questions and "
+    "import ids of Qualtrics",
+    "errors": "formulas with errors in the workbook are read as empty cells: {errors}",
+    "stream": "read in batches: items whose names differ only in spelling, or that sum "
     "up others, are not looked for",
     # tables of counts
     "count": "--{kind} needs whole numbers from 0 to 1e12, got {text!r}{hint}",
     "no counts": "--{kind}: needed at least one rating, got none",
-    "other categories": "--categories: needed those of the columns, {names}, in order, "
-    "got {categories}",
+    "other categories": "--categories: needed the names of the columns, {names}, in "
+    "order, got {categories}",
     "rows of table": "--table: needed as many rows as categories, {n}, got {n_rows}; "
-    "--no-item if no column names the rows",
-    "names of table": "--table: needed rows and columns of the same categories, got "
+    "if no column names the rows, add --no-item",
+    "names of table": "--table: needed the same categories in rows and columns, got "
     "{rows} and {names}",
-    "sum column": "{column!r} is the sum of the other columns: --ignore {name} leaves "
-    "it aside, --raters names the columns of categories",
-    "sum row": "{where}: is the sum of the rows above: delete it",
+    "sum column": "{column!r} is the sum of the other columns: leave it out with "
+    "--ignore {name}, or name the columns of the categories with --raters",
+    "sum row": "{where} is the sum of the rows above: delete it",
     "category or item": "the first column, {column!r}, may name items or be a "
-    "category: --item {name} if it names them, --no-item if not",
-    "items twice": "{column!r} names items more than once; each row is counted as a "
-    "separate item",
+    "category: add --item {name} if it names items, or --no-item if it does not",
+    "items twice": "{column!r} has the same item more than once; each row is counted "
+    "as a separate item",
     # grades
     "no grades": "needed at least one grade, got none",
     "other grade": "needed one of {scale}, got {got}{hint}",
-    "looks missing": "{got} looks like a missing grade: --missing {codes} counts it as "
-    "one, --categories with it in the scale as a grade",
-    "broken": "needed a grade on one line, got {got}: a quote may be opened and not "
-    "closed",
-    "thousands": "{got} may have a thousands mark: {ways}",
-    "thousands read": "{got}: read with a thousands mark; --thousands {mark} says so",
+    "looks missing": "{got} may mean that a grade is missing: if so, add --missing "
+    "{codes}; if not, list all grades with --categories",
+    "broken": "needed a grade on one line, got {got}: perhaps a quote is not closed",
+    "thousands": "{got} may have a thousands separator: {ways}",
+    "thousands read": "read with a thousands separator: {got}; --thousands {mark} "
+    "confirms it",
     "groups": "--thousands: needed {mark!r} before groups of three digits, got {got}",
-    "units": "{got}: numbers with the unit {unit!r}; --units takes it off, "
-    "--categories keeps it",
-    "no unit": "--units: needed a number with the unit {unit}, got {got}{hint}",
-    "no set": "--set-separator: needed {separator!r} between labels of some cell, and "
-    "no semicolon in a label, got {got}",
-    "decimal comma": "{got} looks like a number with a decimal comma: --decimal , "
-    "reads it so, --set-separator , as two labels",
-    "plus": "{got} beside grades such as {other!r} may be that number or the grade "
-    "'{grade}': --categories with the scale in order tells",
-    "truth": "{got} beside 0 or 1 and others may be these numbers, or grades of their "
-    "own: write them alike, or --categories with all grades of the scale",
+    "units": "unit {unit!r} in {got}: remove it with --units, or keep it by listing "
+    "all grades with --categories",
+    "no unit": "--units: needed a number with {unit}, got {got}{hint}",
+    "no set": "--set-separator: needed {separator!r} between labels in at least one "
+    "cell, and no semicolon in a label, got {got}",
+    "decimal comma": "{got} may be a number with a decimal comma or two labels: "
+    "--decimal , reads it as a number, --set-separator , as two labels",
+    "plus": "{got} beside grades such as {other!r} may be a number or the grade "
+    "'{grade}': list all grades in order with --categories",
+    "truth": "{got} may mean 0 or 1, or be grades of their own: write equal grades "
+    "alike, or list all grades with --categories",
     "alike grades": "grades that differ only in spelling are counted as different: "
     "{grades}",
     "too near": "{one} and {other} are too close to differ as numbers, so weights use "
-    "the place of each grade in the scale",
+    "the position of each grade in the scale",
     "measurements": "{n} different numbers in {n_ratings} ratings look like "
     "measurements: percent agreement and unweighted kappas count only equal numbers; "
-    "--coefficients icc_a1 or --metric interval take the distances into account",
+    "--coefficients icc_a1 or --metric interval takes the distances into account",
     "far": "{grades}: far from the other grades{hint}",
-    "no number": "no number: {got} ({where}), so that all grades are text{hint}",
+    "no number": "not a number: {got} ({where}), so all grades are read as text{hint}",
     "number": "a number among grades that are text: {got} ({where}){hint}",
     # ratings
-    "twice": "{rows}: {rater!r} graded {item!r} more than once: --by or --session "
-    "names a column that tells such ratings apart, --repeated first, last or "
-    "mean keeps one; limits of agreement can take all{guess}",
-    "means": "--repeated mean: needs grades that are numbers without a declared scale, "
+    "twice": "{rows}: {rater!r} graded {item!r} more than once: name a column that "
+    "distinguishes these ratings with --by or --session, or keep one with --repeated "
+    "first, last or mean; limits of agreement can use all of them{guess}",
+    "means": "--repeated mean: needed grades that are numbers, without --categories, "
     "got {grades}; --repeated first or last keeps one",
-    "two clusters": "{rows}: needed one cluster of item {item!r} in column {column!r}, "
-    "got {both}; if items are numbered in each cluster, --item names both columns",
+    "two clusters": "{rows}: needed one cluster for item {item!r} in column "
+    "{column!r}, got {both}; if items are numbered within clusters, name both columns "
+    "with --item",
 }

@@ -174,7 +174,7 @@ def _declared(options: Reading) -> tuple[tuple[str, ...], tuple[str, ...]]:
     codes = tuple(map(plain, options.missing_codes))
     again = [grade for grade in dict.fromkeys(declared) if declared.count(grade) > 1]
     if again or "" in declared:
-        what = f"repeated: {again}" if again else "got none between two commas"
+        what = f"repeated: {listed(again)}" if again else "got none between two commas"
         raise ParameterError(f"--categories: needed every grade once, {what}")
     numbers = {Decimal(grade) for grade in declared if is_number(grade)}
     for code in codes:
@@ -312,7 +312,7 @@ def _take_unit(numbers: _Numbers, options: Reading, refuse: _Refuse) -> None:
     if options.units:
         if others:
             stray = [t for t in others if t not in matches and not is_number(t)]
-            of = repr(unit) if unit else "of all"
+            of = f"the unit {unit!r}" if unit else "a unit"
             raise refuse("no unit", others, unit=of, hint=if_missing(stray))
         numbers.written = {text: number for text, (number, _) in matches.items()}
         numbers.facts["unit"] = unit
@@ -387,8 +387,8 @@ def _thousands_mark(
             if is_near and (rest or marks[mark]) and not (is_sure or is_known):
                 continue
             is_told &= not has_decimals  # a decimal comma is for the caller to say
-        ways = f"--thousands {quoted([mark])} reads it so"
-        other = f", --decimal {mark} as a decimal mark" * (not is_known)
+        ways = f"add --thousands {quoted([mark])} if it does"
+        other = f", or --decimal {mark} if this is a decimal mark" * (not is_known)
         return mark, is_told, ways + other
     return None
 
@@ -408,7 +408,10 @@ def count_of(text: str, options: Reading) -> float:
 def if_thousands(text: str) -> str:
     """Return how a number of items is read if its mark is that of thousands."""
     likely = (mark for mark in _MARKS if _grouped(mark, "").fullmatch(text))
-    return "".join(f"; --thousands {quoted([mark])} reads thousands" for mark in likely)
+    return "".join(
+        f"; if this is a thousands separator, add --thousands {quoted([mark])}"
+        for mark in likely
+    )
 
 
 # ---- marks ----

@@ -117,7 +117,7 @@ def _parquet(path: Path, options: Reading) -> Source:
     file = read_foreign(name, ".parquet", lambda: parquet.ParquetFile(path))
     about = file.metadata
     if not options.stream and about.num_rows * about.num_columns < _LARGE_TABLE:
-        raise NoStreamError("it fits the memory")
+        raise NoStreamError("it fits in memory")
     first = islice(file.iter_batches(_HEAD_ROWS), 1)
     table = library(name, "pyarrow").Table
     read = partial(table.from_batches, first, file.schema_arrow)
@@ -238,7 +238,7 @@ def database_of(
                 raise MemoryError(str(error).splitlines()[0]) from error
             except duckdb.Error as error:
                 source.recheck()
-                what = "records that only a whole file can have"
+                what = "has records that cannot be read in batches"
                 raise NoStreamError(what) from error
             finally:
                 if not work.done():
@@ -250,7 +250,7 @@ def database_of(
 
 def _refuse_many(n: int, most: int, what: str) -> None:
     if n > most:
-        raise NoStreamError(f"more than {most} {what}, more than a stream counts")
+        raise NoStreamError(f"has more than {most} {what}, too many to read in batches")
 
 
 def _make_view(answer: Answer, source: Source, layout: Layout) -> None:

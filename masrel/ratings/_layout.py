@@ -1,4 +1,4 @@
-"""Which column of a sheet is what: named by the caller, else by its usual name."""
+"""Roles of columns: named by the caller, or recognised by their usual names."""
 
 import re
 from collections import Counter
@@ -141,9 +141,9 @@ def _refuse_names(sheet: Sheet, used: set[int]) -> None:
         # the first may be R's or pandas' row names
         if (twice[name] > 1) if name else place:
             cells = {text for place in used for text in sheet.columns[place].texts}
-            hint = "; --raters names the columns that rate" * (not sheet.advice)
+            hint = "; name the raters with --raters" * (not sheet.advice)
             if cells & {sheet.header[k] for k in used} - {""}:
-                hint = "; --no-header if this line is a row like the others"
+                hint = "; add --no-header if this line is a row like the others"
             code, facts = (
                 "same name" if name else "no name",
                 {"hint": hint} if hint else {},
@@ -264,7 +264,7 @@ def two_lines(sheet: Sheet) -> dict[str, str]:
         return {}
     one, two = sheet.line_of(0), sheet.line_of(int(sheet.numbers[0]))
     option = f"--header {one},{two}" if two == one + 1 else f"--skip {two - 1}"
-    advice = f"{option} if these are names, --header {one} if it is a row like others"
+    advice = f"add {option} if these are names, --header {one} if they are grades"
     return {"where": sheet.where(0), "advice": advice}
 
 
@@ -482,8 +482,8 @@ def rated_twice(
 ) -> RatingsError:
     """Return the error of a rating that is there twice."""
     is_wide = layout.kind == "wide"
-    guess = ", --rater and --grade name the columns of one row a rating" * is_wide
-    guess += ", --no-item says that no column names items" * layout.is_item_guessed
+    guess = "; if each row is one rating, name columns with --rater, --grade" * is_wide
+    guess += "; if no column names items, add --no-item" * layout.is_item_guessed
     return sheet.refuse(
         "twice",
         rows=" and ".join(sheet.where(row) for row in rows.tolist()),

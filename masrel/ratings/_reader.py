@@ -126,7 +126,7 @@ class RatingsPart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RatingsFile:
-    """A file of ratings, and what was read of it.
+    """A file of ratings, and what was read from it.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ def read_ratings(
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> RatingsFile:
-    r"""Read any file or table of ratings, or say in one sentence which option would.
+    r"""Read the ratings in a file or table, or say which option decides.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ def _streamed(
             return _grouped(answer, source, layout, options)
     except _large.NoStreamError as error:
         if options.stream and (path.exists() or str(path) == "-"):
-            text = f"{path}: {error}; --no-stream reads it as a whole"
+            text = f"{path}: {error}; --no-stream reads the whole file at once"
             raise RatingsError(text) from error
         return None
 

@@ -46,7 +46,7 @@ DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "bla
 """Separators, and what they are called."""
 
 MAX_UNPACKED = 256_000_000
-_PIECE_BY_PIECE = "unpack it, since a large table is read piece by piece"
+_IN_BATCHES = "unpack it, so that it can be read in batches"
 # what readers of other formats raise for bytes that are not theirs
 _ANY: tuple[type[Exception], ...] = (
     *(ValueError, TypeError, KeyError, OSError, RuntimeError, EOFError),
@@ -201,7 +201,7 @@ class Sheet:
         """Return the error of this file, at a row and a column."""
         column = "" if place is None else f", column {self.header[place]!r}"
         where = f"{self.name}: {at}{column}" if at else self.name
-        hint = f"; {self.advice} takes the names from below" if self.advice else ""
+        hint = f"; if the names are below, add {self.advice}" if self.advice else ""
         return refusal(where, code, **{"hint": hint, **facts})
 
     def hold(self, texts: Sequence[str]) -> NDArray[np.bool_]:
@@ -288,11 +288,11 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
         inner = name[: -len(suffix)] if name.lower().endswith(suffix) else name
         data = read_foreign(name, suffix, lambda: file().read(MAX_UNPACKED + 1))
         if len(data) > MAX_UNPACKED:  # it would fill the memory
-            raise refusal(name, "unpacked", most=MAX_UNPACKED, do=_PIECE_BY_PIECE)
+            raise refusal(name, "unpacked", most=MAX_UNPACKED, do=_IN_BATCHES)
         return inner, data
     if suffix != ".zip" or is_export:  # which may have a file of each annotator
         return name, data
-    files = unzipped(name, suffix, data, MAX_UNPACKED, _PIECE_BY_PIECE, ".*[^/]")
+    files = unzipped(name, suffix, data, MAX_UNPACKED, _IN_BATCHES, ".*[^/]")
     if len(files) != 1:
         raise refusal(name, "members", n=len(files), members=", ".join(list(files)[:5]))
     ((inner, read),) = files.items()
@@ -377,16 +377,16 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
             line=line,
             encoding=encoding,
             byte=data[error.start],
-            hint=f"{likely} may be right" if likely else "names the right one",
+            hint=f"try --encoding {likely}" if likely else "name it with --encoding",
         ) from error
     except (LookupError, ValueError) as error:
         raise ParameterError(
-            f"--encoding: there is none called {encoding!r}"
+            f"--encoding: there is no encoding {encoding!r}"
         ) from error
     if "\0" in text:
         line = n_before + text.count("\n", 0, text.index("\0")) + 1
         likely = _of_two_bytes(data)
-        hint = f"; --encoding {likely} may be right" if likely else ""
+        hint = f"; try --encoding {likely}" if likely else ""
         raise refusal(name, "zero byte", line=line, hint=hint)
     return text.removeprefix("\ufeff")
 

@@ -1,4 +1,4 @@
-"""Printed agreement held against every table: a row a claim, a row a reading."""
+"""Tables of an audit: one row per claim, and one row per reading."""
 
 from collections.abc import Sequence
 from dataclasses import asdict

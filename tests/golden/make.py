@@ -2,7 +2,8 @@
 
 ``python -m tests.golden.make [--dry-run] [GROUP ...]``
 
-The group "numbers" takes some minutes, and is made only where it is named.
+The group "numbers" takes 15 minutes of processor time and prints nothing before its
+end; it is made only if it is named.
 """
 
 import sys

@@ -507,36 +507,36 @@ REFUSED: list[tuple[str | None, Any, dict[str, Any], str]] = [
         "gave several, 1, 2",
     ),
     ("inspect-ai", log(sample("a")), {}, "got none"),
-    ("inspect-ai", {**log(), "samples": [{"id": 1}]}, {}, "another shape"),
+    ("inspect-ai", {**log(), "samples": [{"id": 1}]}, {}, "another structure"),
     ("lm-eval", [metrics(0, acc=1, f1=0)], {}, "--grade: .* acc, f1, got none"),
     ("lm-eval", [metrics(0, acc=1), metrics(0, acc=0)], {}, "more than once"),
-    ("lm-eval", [{**metrics(0), "metrics": ["acc"]}], {}, "another shape"),
+    ("lm-eval", [{**metrics(0), "metrics": ["acc"]}], {}, "another structure"),
     (
         "promptfoo",
         eval_file(output(0, 0)),
         {"grade": "pass"},
         "--grade: .* success, got",
     ),
-    ("promptfoo", {"results": {"version": 2, "table": {}}}, {}, "another shape"),
-    ("mlflow", trace("t", {"assessment_name": "ok"}), {}, "another shape"),
+    ("promptfoo", {"results": {"version": 2, "table": {}}}, {}, "another structure"),
+    ("mlflow", trace("t", {"assessment_name": "ok"}), {}, "another structure"),
     (
         "mlflow",
         trace("t", spans=[{"span_id": "x", "parent_span_id": "y"}]),
         {},
-        "shape",
+        "structure",
     ),
-    ("mlflow", trace("t", assessment("HUMAN", "", 1)), {}, "needed its annotator"),
+    ("mlflow", trace("t", assessment("HUMAN", "", 1)), {}, "needed an annotator"),
     ("langsmith", [feedback(None, "app", score=1)], {}, "needed an item"),
     ("langsmith", [{**feedback("r", "app"), "feedback_source": None}], {}, "annotator"),
-    ("langfuse", [score("t", "ANNOTATION", 1)], {}, "item t: needed its annotator"),
-    ("mt-bench", [{**verdict([], "a", "b", "tie")}], {}, "another shape"),
+    ("langfuse", [score("t", "ANNOTATION", 1)], {}, "item t: needed an annotator"),
+    ("mt-bench", [{**verdict([], "a", "b", "tie")}], {}, "another structure"),
     (
         None,
         [{**metrics(0, acc=1), **feedback("r", "app")}],
         {},
         "--from lm-eval or --from langsmith",
     ),
-    (None, {"1": lewidi("Ann1,Ann2", "0,1,1")}, {}, "item '1': needed an annotator of"),
+    (None, {"1": lewidi("Ann1,Ann2", "0,1,1")}, {}, "item '1': needed one grade from"),
     (None, json.dumps(HUMANS) + json.dumps(HUMANS), {}, ""),
     *(
         (source, content, {}, r"e\.json: ")
@@ -635,5 +635,5 @@ def test_a_packed_log_that_is_damaged(tmp_path: Path) -> None:
     data = LOG.read_bytes()
     place = data.index(b"samples/b_epoch_1.json") + 40
     (tmp_path / "log.eval").write_bytes(data[:place] + bytes(40) + data[place + 40 :])
-    with pytest.raises(MasrelError, match=r"is damaged, or no \.eval file"):
+    with pytest.raises(MasrelError, match=r"is damaged or not a \.eval file"):
         read_ratings(tmp_path / "log.eval")

@@ -242,7 +242,7 @@ READ: dict[str, tuple[str, str, Any, dict[str, Any], Any, dict[str, int]]] = {
 SPAN = field("labels", start=0, end=3, text="Kim", labels=["PER"])
 DOCCANO = {"id": 1, "text": "a", "username": "ann"}
 REFUSED: list[tuple[str, Any, dict[str, Any], str]] = [
-    ("label-studio", SEVERAL, {}, "--grade: .*, mood, stars, got none"),
+    ("label-studio", SEVERAL, {}, "--grade: .* mood, stars, got none"),
     ("label-studio", SEVERAL, {"grade": "box"}, "--grade: .* got 'box'"),
     ("label-studio", MIN, {}, "--grade: .*text, mood, stars"),
     ("label-studio", MIN, {"grade": "mood"}, "several, good, bad"),
@@ -258,17 +258,17 @@ REFUSED: list[tuple[str, Any, dict[str, Any], str]] = [
         {},
         "spans, regions and relations",
     ),
-    ("label-studio", [task(1, annotation(None, GOOD))], {}, "needed its annotator"),
-    ("label-studio", [task(1, annotation(KIM, "x"))], {}, "another shape"),
-    ("label-studio", [{"id": 1, "annotations": 3}], {}, "another shape"),
+    ("label-studio", [task(1, annotation(None, GOOD))], {}, "needed an annotator"),
+    ("label-studio", [task(1, annotation(KIM, "x"))], {}, "another structure"),
+    ("label-studio", [{"id": 1, "annotations": 3}], {}, "another structure"),
     ("doccano", [{**DOCCANO, "label": ["good", "bad"]}], {}, "several"),
     ("doccano", [{**DOCCANO, "label": [[0, 3, "PER"], [5, 8, "LOC"]]}], {}, "spans"),
     ("doccano", [{**DOCCANO, "entities": [{"label": "PER"}]}], {}, "spans"),
-    ("doccano", [{"id": 1, "label": ["good"]}], {}, "needed its annotator"),
+    ("doccano", [{"id": 1, "label": ["good"]}], {}, "needed an annotator"),
     ("doccano", [{"label": ["good"], "username": "ann"}], {}, "needed an item"),
-    ("doccano", [{"id": 1, "annotations": ["x"]}], {}, "another shape"),
+    ("doccano", [{"id": 1, "annotations": ["x"]}], {}, "another structure"),
     ("doccano", [{"id": [1], "label": ["a"], "user": ["ann"]}], {}, ""),
-    ("prodigy", TWO_LABELS, {}, "--grade: .*, ECO, POL"),
+    ("prodigy", TWO_LABELS, {}, "--grade: .* ECO, POL"),
     ("prodigy", [answer(5, "kim", "A", "B")], {}, "item 5: needed one category"),
     (
         "prodigy",
@@ -276,15 +276,15 @@ REFUSED: list[tuple[str, Any, dict[str, Any], str]] = [
         {},
         "spans, regions and relations",
     ),
-    ("prodigy", [answer(1, "", "A")], {}, "needed its annotator"),
+    ("prodigy", [answer(1, "", "A")], {}, "needed an annotator"),
     ("prodigy", [answer(5, "kim", accept={"A": 1})], {}, ""),
     ("inception", [{"doc": None, "user": "a", "label": "b"}], {}, "needed an item"),
     ("inception", [{"doc": "a", "user": ["x"], "label": "l"}], {}, ""),
     ("inception", "doc,user,begin,text,label\na,x,0,Kim,P\n", {}, "columns of spans"),
     ("inception", "doc,user,label\na,x,good\na,x,bad\n", {}, "more than once"),
-    ("inception", "doc,user\na,x\n", {}, "another shape"),
-    ("inception", "Type,Document\nDocumentPosition,a\n", {}, "another shape"),
-    ("brat", [{"a": 1}], {}, "--from: needed label-studio, doccano"),
+    ("inception", "doc,user\na,x\n", {}, "another structure"),
+    ("inception", "Type,Document\nDocumentPosition,a\n", {}, "another structure"),
+    ("brat", [{"a": 1}], {}, "--from: needed one of label-studio, doccano"),
     *(
         (source, content, {}, r"e\.(json|csv): ")
         for source in ("label-studio", "doccano", "prodigy", "inception")

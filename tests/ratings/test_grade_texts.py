@@ -124,7 +124,7 @@ BOTH = ["--thousands", "--decimal"]
         ("5%|7%|6|9%", {"units": True}, ["line 3", "'6'"]),
         ("5 mm|6 mm|1 cm|7 mm", {"units": True}, ["line 3", "'1 cm'"]),
         ("5|6|1|7", {"units": True}, ["--units"]),
-        ("n/a|na|?|-|missing|NULL", {}, ["--missing 'n/a,na,?,-,missing' "]),
+        ("n/a|na|?|-|missing|NULL", {}, ["--missing 'n/a,na,?,-,missing'"]),
         ("x|y|x|y", {"set_separator": "/"}, ["--set-separator"]),
         ("x;y/z|y|x|y", {"set_separator": "/"}, ["--set-separator", "'x;y/z'"]),
     ],

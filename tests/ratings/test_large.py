@@ -174,7 +174,10 @@ def test_names_of_items_are_looked_through(
     [
         ({"id": [7, 8, 7], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 4: .*'7'"),
         ({"id": ["b", "a", "b"], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 4"),
-        ({"id": [1, None], "A": [1, 1], "B": [1, 2]}, "row 3, column 'id': needed the"),
+        (
+            {"id": [1, None], "A": [1, 1], "B": [1, 2]},
+            "row 3, column 'id': needed a name for the",
+        ),
         (
             {"id": ["p", "NA"], "A": [1, 1], "B": [1, 2]},
             "row 3, column 'id': .*got 'NA",
@@ -194,16 +197,19 @@ def test_names_of_items_are_looked_through(
         ),
         (
             {"item": [1, 2], "rater": ["A", ""], "grade": [1, 2]},
-            "row 3, column 'rater': needed the rater, got ''",
+            "row 3, column 'rater': needed a name for the rater, got ''",
         ),
         ({"id": [1, 2], "A": [None, None], "B": ["", ""]}, "needed at least one grade"),
         ({"id": list("bab"), "A": [1, 1, 2], "B": [None, 2, 2]}, "row 2 and row 4"),
         ({"id": list("bbb"), "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 3"),
         (
             {"id": range(40), **dict.fromkeys("AB", [1, 2] * 20), "C": [7, 8] * 20},
-            "'C': no rater by",
+            "not look like raters, by their names or grades",
         ),
-        ({"id": ["p", "q", "#"], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 4: '#' sums up"),
+        (
+            {"id": ["p", "q", "#"], "A": [1, 1, 2], "B": [1, 2, 2]},
+            "row 4: '#' looks like",
+        ),
     ],
 )
 def test_what_is_refused_is_refused_where_it_stands(
@@ -223,12 +229,12 @@ HEAD = "id,A,B\n" + "".join(f"p{k},{k % 3},{k // 2 % 3}\n" for k in range(500))
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("p,1,2,3", "line 502: needed 3 cells, as the first line has, got 4: 'p, 1"),
-        ("p,1", "line 502: needed 3 cells, as the first line has, got 2: 'p, 1'"),
-        ('"p,1,2', "line 502: a quote that is opened is not closed"),
+        ("p,1,2,3", "line 502: needed 3 cells, as in the first line, got 4: 'p, 1"),
+        ("p,1", "line 502: needed 3 cells, as in the first line, got 2: 'p, 1'"),
+        ('"p,1,2', "line 502: a quote is opened but not closed"),
         ("p\xe9,1,2", "line 502: needed utf-8 text, got the byte 0xe9"),
-        ("p,1,n/a", "line 502, column 'B': 'n/a' looks like a missing grade"),
-        (f"{'p' * 140_000},1,n/a", "line 502, column 'B': 'n/a' looks like a missing"),
+        ("p,1,n/a", "line 502, column 'B': 'n/a' may mean that a grade"),
+        (f"{'p' * 140_000},1,n/a", "line 502, column 'B': 'n/a' may mean"),
     ],
 )
 def test_a_wrong_line_of_a_text_is_refused_where_it_stands(

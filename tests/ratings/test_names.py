@@ -151,7 +151,7 @@ def test_a_refusal_names_the_option_that_reads_the_table(
         (
             TABLE,
             {"header": (1, 2), "item": "patient"},
-            "'patient'; there are 'patient P1'",
+            "'patient'; found 'patient P1'",
         ),
         # what is named by the caller is no title, and no note has no letter
         (f"{TABLE}\nSource: ward 4, 2024\n", {}, "line 6: needed 4 cells"),
@@ -160,8 +160,8 @@ def test_a_refusal_names_the_option_that_reads_the_table(
         (f'{TABLE}"P4\n\nb",1,1\n', {}, "line 5: needed 4 cells"),
         (TITLE + TABLE, {"item": "patient"}, "line 1: .*--skip 2"),
         (f"Date,2024,,\n,,,\n{TABLE}", {"item": "patient"}, "'patient'.*--skip 2"),
-        ("item,Kim,Kim\na,1,2\nb,2,2\n", {}, "line 1: .*'Kim' is there twice"),
-        ("item,Kim,Kim\na,1,2\n", {"raters": "Kim"}, "line 1: .*'Kim' is there twice"),
+        ("item,Kim,Kim\na,1,2\nb,2,2\n", {}, "line 1: .*'Kim' occurs twice"),
+        ("item,Kim,Kim\na,1,2\n", {"raters": "Kim"}, "line 1: .*'Kim' occurs twice"),
         ("item,,Kim,Lee\na,x,1,2\nb,y,2,2\n", {}, "line 1: .*column 2, got none"),
     ],
 )

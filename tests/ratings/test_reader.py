@@ -252,7 +252,11 @@ def test_groups_and_sessions_are_parts(
             "name columns with --rater",
         ),
         (NUMBERED, {}, "--no-header"),  # though they are no grades of other rows
-        (TWICE, {"repeated": "mean", "categories": ["1", "2", "3"]}, "declared scale"),
+        (
+            TWICE,
+            {"repeated": "mean", "categories": ["1", "2", "3"]},
+            "without --categories",
+        ),
         (BY_SITE.replace("S", ""), {"by": "site"}, "line 3, column 'site'"),
         (
             "rater,A,B,C\nKim,1,2,n/a\nLee,1,2,2\n",
@@ -262,7 +266,7 @@ def test_groups_and_sessions_are_parts(
         (
             "Kim,Lee,Ann\n1,1,2\n2,2,1\n1,2,2\n2,2,2\n",
             {},
-            "'Kim', holds .*--no-item if",
+            "'Kim', has .*--no-item if",
         ),
         (
             "item,mild,severe\nA,2,1\n",
@@ -282,7 +286,7 @@ def test_groups_and_sessions_are_parts(
                 ({"no_item": True, "item": "patient"}, "--no-item"),
                 ({"counts": True, "session": "patient"}, "--session: counts"),
                 ({"counts": True, "missing_codes": ["9"]}, "--missing: .* got 9"),
-                ({"categories": ["1", "2", "2", "3"]}, r"repeated: \['2'\]"),
+                ({"categories": ["1", "2", "2", "3"]}, r"repeated: '2'"),
                 (
                     {"categories": ["1", "2", "3"], "missing_codes": ["3"]},
                     "'3' is a grade or miss",

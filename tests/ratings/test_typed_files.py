@@ -393,7 +393,7 @@ def test_names_in_each_other(
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (FEW, "--raters Kim,Lee if these rate, --transpose if 'A', 'B' do"),
+        (FEW, "--raters Kim,Lee, or add --transpose if they are 'A', 'B'"),
         ([{"id": i, "ratings": BY_ITEM[i]} for i in "AB"], "--raters Kim,Lee"),
         ([{"id": "A", "annotations": BY_ITEM["A"]}, OBJECTS[1]], "value 1: .* a dict"),
         ({"A": {"annotators": "Kim", "annotations": "x,y"}}, "item 'A': .*annotator"),
@@ -415,7 +415,12 @@ NO_ROWS: dict[str, list[Any]] = {"item": [], "Kim": [], "Lee": []}
 LISTS = {"item": ["A", "B"], "Kim": [[1], [2, 3]], "Lee": [1, 2]}
 REFUSED: list[tuple[str, Write, dict[str, Any], str]] = [
     ("xlsx", partial(workbook, R=BLANKS, empty=[]), {}, "row 6.*n/a"),
-    ("xlsx", partial(workbook, one=WIDE, two=WIDE), {}, "needs --sheet .*, one, two"),
+    (
+        "xlsx",
+        partial(workbook, one=WIDE, two=WIDE),
+        {},
+        "sheets, one, two: .*--sheet",
+    ),
     (
         "xlsx",
         partial(workbook, one=WIDE),
@@ -442,19 +447,22 @@ REFUSED: list[tuple[str, Write, dict[str, Any], str]] = [
         ("json", partial(text, content=content), {}, words)
         for content, words in (
             ('[{"item": "A", "Kim": 1, "Kim": 2}]', "key 'Kim' twice"),
-            ('[{"item": "A", "Kim": [1]}]', "column 'Kim', value 1: .* a list; --from"),
-            ('[{"item": "A"\n,]', r"is damaged, or no .json file .*line 2"),
+            (
+                '[{"item": "A", "Kim": [1]}]',
+                "column 'Kim', value 1: .* a list; .*--from",
+            ),
+            ('[{"item": "A"\n,]', r"is damaged or not a .json file .*line 2"),
             ("[]", "needed a JSON list of objects"),
-            ("{}", "needed rows of ratings below the names"),
+            ("{}", "needed rows of ratings below the header"),
             ("null", "needed a JSON list of objects"),
             (
                 '{"data": [{"a": 1}]}',
-                "'data', value 1: needed text or numbers, got a dict",
+                "'data', value 1: needed text or a number, got a dict",
             ),
             ("[1, 2]", "needed a JSON list of objects"),
             ('{"item": ["A"], "Kim": []}', "value 1: .* a list"),
-            ("nonsense", r"is damaged, or no .json file .*line 1"),
-            ('{"a": 1}\n{"a": \n', r"is damaged, or no .json file .*line 2"),
+            ("nonsense", r"is damaged or not a .json file .*line 1"),
+            ('{"a": 1}\n{"a": \n', r"is damaged or not a .json file .*line 2"),
         )
     ),
 ]
@@ -492,7 +500,7 @@ def test_another_format_is_one_sentence(
         ):
             read_ratings(path)
     pytest.importorskip(library)
-    with pytest.raises(RatingsError, match=rf"or no \.{ending} file") as refusal:
+    with pytest.raises(RatingsError, match=rf"or not an? \.{ending} file") as refusal:
         read_ratings(path)
     assert "\n" not in str(refusal.value)
 
@@ -521,7 +529,7 @@ def test_a_file_cut_short_is_refused_not_read_in_part(
     for part in (0.2, 0.5, 0.9):
         # an odd number of bytes: an .xpt file has lines of 80, and no end but the last
         path.write_bytes(data[: int(part * len(data)) | 1])
-        with pytest.raises(RatingsError, match="is damaged, or no"):
+        with pytest.raises(RatingsError, match="is damaged or not a"):
             read_ratings(path)
 
 

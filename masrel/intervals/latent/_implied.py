@@ -123,7 +123,7 @@ def _shares(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictiveCheck:
-    """One property of the ratings beside what the model would have made of it.
+    """A property of the ratings compared with what the model predicts.
 
     Attributes
     ----------

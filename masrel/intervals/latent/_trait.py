@@ -142,7 +142,7 @@ def latent_trait(
     progress: Progress | None = None,
     rng: np.random.Generator | int | None = None,
 ) -> LatentTrait:
-    """Place items, raters and thresholds on one scale, and read kappa off it.
+    """Place items, raters and thresholds on one scale, and derive kappa from it.
 
     Parameters
     ----------
