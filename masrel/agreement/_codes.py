@@ -397,7 +397,7 @@ def code_long(
     Warns
     -----
     RatingsWarning
-        As `code_ratings`.
+        As for `code_ratings`.
 
     Examples
     --------
@@ -653,7 +653,7 @@ def count_ratings(
     Warns
     -----
     RatingsWarning
-        As `code_ratings`.
+        As for `code_ratings`.
 
     Examples
     --------

@@ -160,7 +160,7 @@ def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float
     Warns
     -----
     UndefinedStatisticWarning
-        As `p_value`.
+        As for `p_value`.
 
     References
     ----------
@@ -324,9 +324,9 @@ class Band:
     word : str
         Its name.
     probability : float
-        That the true value lies in it.
+        Probability that the true value lies in it.
     cumulative : float
-        That the true value lies in it or in a better one.
+        Probability that the true value lies in it or in a better one.
     """
 
     low: float
@@ -344,7 +344,7 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     estimate : Estimate
         A coefficient with its standard error.
     scale : {"landis_koch", "altman", "fleiss", "cicchetti"}, optional
-        Whose words.
+        Publication whose words are used.
 
     Returns
     -------
@@ -414,7 +414,7 @@ def strength(value: float, *, scale: BandScale = "landis_koch") -> str:
     value : float
         A coefficient.
     scale : {"landis_koch", "altman", "fleiss", "cicchetti"}, optional
-        Whose words.
+        Publication whose words are used.
 
     Returns
     -------
@@ -453,7 +453,7 @@ def benchmark(
     estimate : Estimate
         A coefficient with its standard error.
     scale : {"landis_koch", "altman", "fleiss", "cicchetti"}, optional
-        Whose words.
+        Publication whose words are used.
     level : float, optional
         Cumulative probability that is needed.
 
@@ -470,7 +470,7 @@ def benchmark(
     Warns
     -----
     UndefinedStatisticWarning
-        As `bands`.
+        As for `bands`.
 
     Notes
     -----

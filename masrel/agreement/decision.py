@@ -47,7 +47,7 @@ class DStudy:
         Φ(λ) at the cut: as Φ, with the squared distance of the mean from the cut added
         to the universe.
     cut_interval : Interval or None
-        That of `cut_dependability`.
+        Interval of `cut_dependability`.
     cost : float or None
         What the ratings cost, of a design that was sought by its price.
     reason : str or None
@@ -227,7 +227,7 @@ def cheapest_design(
     aim : float
         The coefficient to be reached, between 0 and 1.
     prices : sequence of float, optional
-        Of a level of each facet, in their order, and of one rating; a study has as
+        Prices of a level of each facet, in order, and of a rating; a study has as
         many persons as this one. A rating costs 1 and nothing else does unless given.
     of : {"dependability", "generalizability"}, optional
         Which coefficient: Φ, or Eρ² where persons are only compared.
@@ -281,7 +281,8 @@ def cheapest_design(
             not (reached >= aim).any(),
             f"aim: cannot be reached with up to {most} levels of each facet: the "
             f"highest value is {reached.max():.3g}, got {shown(aim)}"
-            + f"; {study.of} has no variance" * bool(reached.max() == 0.0),
+            + f"; {study.of} has no variance"
+            * bool(reached.max() == 0.0),
         )
     )
     costs: Any = prices[-1] * study.n_levels[study.of] * math.prod(sizes.values())

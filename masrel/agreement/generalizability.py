@@ -84,16 +84,16 @@ class GStudy:
     n_levels : mapping of str to int
         Levels of each column.
     mean : float
-        Of all ratings.
+        Mean of all ratings.
     n_ratings : int
-        How many there are.
+        Number of ratings.
     method : {"ANOVA", "REML", "moments"}
         Mean squares of a balanced design; restricted likelihood of one with gaps; or
         Henderson's first method, of one that is too large for that.
     level : float
         Level of intervals.
     seed : int or None
-        Of the draws from which intervals are read; None where a generator was given.
+        Seed of the draws from which intervals are read; None if a generator was given.
     notes : tuple of str
         What the reader must know of the components.
     draws : ndarray, shape (n_draws, n_effects)

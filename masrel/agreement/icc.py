@@ -312,7 +312,7 @@ def icc_f_test(
     Parameters
     ----------
     ratings, form, categories : optional
-        As of `icc`.
+        As for `icc`.
 
     Returns
     -------
@@ -508,7 +508,7 @@ def kendall_w_test(
     Parameters
     ----------
     ratings, categories, ties : optional
-        As of `kendall_w`.
+        As for `kendall_w`.
 
     Returns
     -------
@@ -519,12 +519,12 @@ def kendall_w_test(
     Raises
     ------
     RatingsError
-        As `kendall_w`.
+        As for `kendall_w`.
 
     Warns
     -----
     UndefinedStatisticWarning
-        As `kendall_w`.
+        As for `kendall_w`.
 
     Examples
     --------

@@ -128,7 +128,7 @@ def mdc(
     Parameters
     ----------
     ratings, kind, categories, level : optional
-        As of `sem`.
+        As for `sem`.
 
     Returns
     -------
@@ -140,12 +140,12 @@ def mdc(
     Raises
     ------
     RatingsError, ParameterError
-        As `sem`.
+        As for `sem`.
 
     Warns
     -----
     UndefinedStatisticWarning
-        As `sem`.
+        As for `sem`.
 
     References
     ----------
@@ -274,7 +274,7 @@ class LimitsOfAgreement:
     lower, upper : float
         The limits: mean ∓ z sd; ``nan`` when undefined.
     share : float
-        Of the differences that are to lie between the limits.
+        Share of the differences that lie between the limits.
     mean_interval, lower_interval, upper_interval : Interval
         Exact intervals, each for itself.
     inner, outer : tuple of float
@@ -325,7 +325,7 @@ def limits_of_agreement(
         The declared scale in order: numbers count by value, text by rank. Needed for
         text.
     share : float, optional
-        Of the differences that are to lie between the limits.
+        Share of the differences that lie between the limits.
     level : float, optional
         Level of the intervals.
 

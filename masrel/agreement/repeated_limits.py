@@ -53,7 +53,7 @@ class RepeatedLimits:
     low, high : float
         The limits: bias ∓ z sd; ``nan`` when undefined.
     share : float
-        Of the differences that are to lie between the limits.
+        Share of the differences that lie between the limits.
     bias_interval, low_interval, high_interval : Interval
         For other items like these, each for itself.
     slope : float
@@ -431,9 +431,10 @@ class LimitsWithMean:
     Attributes
     ----------
     limit : Estimate
-        How far on either side, z √((k − 1)/k) standard errors with k observers.
+        Distance of the limits from the mean: z √((k − 1)/k) standard errors, with k
+        observers.
     share : float
-        Of the measurements that are to lie between the limits.
+        Share of the measurements that lie between the limits.
     sem, mdc : Estimate
         Standard error of a single measurement, and 1.96 √2 of it: what chance exceeds
         in 5 % of the differences of two single measurements of the same.
@@ -441,9 +442,9 @@ class LimitsWithMean:
         Variance of repeated measurements of an item by an observer; ``nan`` without.
     averages, differences : ndarray, shape (n_places,)
         Of each item and observer the mean of all observers, and the observer's own
-        mean less that.
+        mean minus that.
     n_measurements : int
-        Of all items by all observers.
+        Number of measurements of all items by all observers.
 
     Notes
     -----
@@ -481,7 +482,7 @@ def limits_with_mean(
         Names of the columns of what each observer measured; a number that is missing
         was not measured.
     share : float, optional
-        Of the measurements that are to lie between the limits.
+        Share of the measurements that lie between the limits.
     level : float, optional
         Level of the intervals.
 

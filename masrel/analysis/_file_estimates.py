@@ -71,7 +71,7 @@ class Estimating:
     metric : str or None
         Krippendorff's difference function, in place of weights.
     target : {"items", "raters", "both"} or None
-        What a new study would draw anew; no interval when None.
+        The population to generalise to; no interval if None.
     interval : str
         Kind of interval; ``"auto"`` is the newest rule that chooses one.
     convention : {"irrcac", "spss", "over_n"} or None
@@ -80,7 +80,7 @@ class Estimating:
     level : float
         Level of intervals.
     n_resamples, seed : int
-        Of intervals that draw.
+        Number of resamples and seed of intervals that draw.
     words : str or None
         Whose words for values; the best that the true value reaches with 95 %
         probability is named.

@@ -119,17 +119,17 @@ class Claim:
     name : str, optional
         What it is called in tables.
     n_items, n_categories, n_raters : int
-        As of `consistent_tables`.
+        As for `consistent_tables`.
     agreement, kappa : str, optional
-        As of `consistent_tables`; at least one is needed.
+        As for `consistent_tables`; at least one is needed.
     agreement_weights, kappa_weights : str, optional
-        As of `consistent_tables`, or ``"any"``: the paper does not say which.
+        As for `consistent_tables`, or ``"any"`` if the paper does not say which.
     rounding : str, optional
-        As of `consistent_tables`.
+        As for `consistent_tables`.
     margins_1, margins_2 : tuple of int, optional
         How many items the first and the second of two raters put into each category.
     standard_error : str, optional
-        Of kappa, of two raters.
+        Standard error of kappa, for two raters.
     low, high : str, optional
         The interval of kappa, of two raters; both or neither.
     level : float, optional

@@ -64,11 +64,11 @@ class Reading:
         Which standard error p is of, and how many sides it has: ``"null, two-sided"``;
         None where no p is printed.
     n_tables : int or None
-        As of `ConsistentTables`.
+        As for `ConsistentTables`.
     status : str
-        As of `ConsistentTables`.
+        As for `ConsistentTables`.
     n_agreed : tuple of int
-        As of `ConsistentTables`.
+        As for `ConsistentTables`.
     """
 
     n_items: int

@@ -147,7 +147,7 @@ def estimate(
     n_resamples : int, optional
         Resamples of a bootstrap, where they are drawn.
     rng : Generator or int, optional
-        Where randomness comes from, for methods that draw.
+        Source of randomness, for methods that draw.
     clusters : sequence of labels, length n_items, optional
         The cluster of every item, such as the patient of a site: what a new study
         would draw anew, with `target` "items" and any `method` but "posterior". Each

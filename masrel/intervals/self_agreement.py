@@ -61,7 +61,7 @@ class RetestModel:
     other_kappa : Quantity
         The mean under the other prior that moves its interval most.
     other_prior : str
-        That prior.
+        The other prior.
     """
 
     kappa: Quantity

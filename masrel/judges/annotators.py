@@ -655,7 +655,7 @@ class JudgeDifference:
     standard_error : float
         By the jackknife; ``nan`` when undefined.
     interval : Interval
-        Of this difference alone.
+        Interval of this difference alone.
     p_value, p_holm : float
         Two-sided, that there is no difference; and adjusted for all pairs.
     n_items : int

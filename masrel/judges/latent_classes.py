@@ -430,7 +430,7 @@ def dawid_skene_intervals(
     Parameters
     ----------
     ratings : iterable of (item, rater, grade), or long DataFrame
-        As `dawid_skene` takes them.
+        Ratings in the form that `dawid_skene` takes.
     level : float, optional
         Nominal level.
     n_resamples : int, optional
@@ -598,7 +598,7 @@ class EffectiveNumber:
     mean_correlation : float
         ρ, the mean correlation of the errors of two judges.
     n_judges, n_items : int
-        How many there are.
+        Number of judges, and of items.
     left_out : tuple of (judge, judge)
         Pairs without a correlation, which are not in the mean: a judge of theirs makes
         no error on their items, or only errors.

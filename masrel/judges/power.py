@@ -35,7 +35,7 @@ class JudgePlan:
     monte_carlo_error : float
         Standard error of the power.
     advantage : float
-        That of the judge, in the mean.
+        Advantage of the judge, on average.
     difference : float
         By how much a human's share exceeds the judge's, in the mean; the judge can
         pass where it is less than epsilon.

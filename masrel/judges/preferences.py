@@ -200,7 +200,7 @@ class BradleyTerry:
     low, high : ndarray, shape (n_models,)
         Ends of the interval of each.
     covariance : ndarray, shape (n_models, n_models)
-        Of the strengths, by items, for differences of two.
+        Covariance of the strengths, by items, for differences of two.
     n_comparisons, n_ties, n_items : int
         Verdicts, ties among them, and items.
     level : float

@@ -250,12 +250,9 @@ def _items_table(seen: PartSeen) -> Table | None:
         [*_OF_ITEMS, Column(key="grades", heading=heading, align="left")],
         rows,
         notes=(
-            "Disagreement: of the pairs of ratings of an item, "
-            + (
-                "the share that differ."
-                if seen.distance == "identity"
-                else f"how far they differ on average ({by})."
-            ),
+            "Disagreement: share of the pairs of ratings of an item that differ."
+            if seen.distance == "identity"
+            else f"Disagreement: mean distance between two ratings of an item ({by}).",
         ),
         data="simulated" if seen.file.simulated else "foreign",
     )

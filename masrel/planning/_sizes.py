@@ -172,7 +172,7 @@ def plan_grid(
     value : float or sequence of float, optional
         True coefficients.
     prevalences : sequence of float, or several of them, optional
-        Of the categories; with model "table" one table.
+        Shares of the categories; with model "table" one table.
     executor : {"dask"}, optional
         Who plans the cells; this process when not given. Dask is the extra
         ``masrel[dask]``.

@@ -117,7 +117,7 @@ class Study:
     power, assurance : float or None
         Chances to be reached.
     prices : tuple of float or None
-        Of an item, a rater, and a rating; (0, 0, 1) when not given.
+        Prices of an item, a rater, and a rating; (0, 0, 1) unless given.
     max_cost : float or None
         What the study may cost; without an aim, the study is the most that this buys.
     method : {"auto", "exact", "simulation", "wald", "goodness-of-fit"}
@@ -126,7 +126,7 @@ class Study:
         Parameters of a Beta distribution of the true value, over which the power of
         method "goodness-of-fit" at a given size is averaged.
     rater_share : float
-        Of the error of icc_a1, how much the levels of the raters make.
+        Share of the error of icc_a1 that comes from the levels of the raters.
     n_studies : int or None
         Studies that are drawn; as many as a small Monte Carlo error needs when not
         given.
@@ -288,7 +288,7 @@ class Plan:
     method : {"exact", "simulation", "wald", "goodness-of-fit"}
         How the numbers were computed.
     prevalences : tuple of float
-        Of the categories; empty where a model has none.
+        Shares of the categories; empty if the model has none.
     table : tuple of tuple of float
         The joint probabilities of two raters, of model "table".
     p_missing : float
@@ -317,7 +317,7 @@ class Plan:
     reaches_aim : bool or None
         Whether it reaches what was aimed at; None without an aim.
     cost : float
-        Of items, raters and ratings at their prices.
+        Cost of items, raters and ratings at their prices.
     n_studies : int
         Simulated studies; 0 where nothing was drawn.
     seed : int or None
@@ -522,11 +522,11 @@ def pilot(
     target : {"items", "raters", "both"}
         What a new study would draw anew.
     weights : str or Weights, optional
-        As of the coefficient.
+        Weights of the coefficient.
     categories : sequence of str, int or float, optional
         The scale in order; the categories met unless given.
     level : float, optional
-        Of the interval.
+        Level of the interval.
 
     Returns
     -------

@@ -245,7 +245,7 @@ def grades(
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
         Labels or numbers; None and ``nan`` are missing.
     raters, categories, ordered : optional
-        As of `confusion`.
+        As for `confusion`.
     ax : Axes, optional
         Where it is drawn; on a new figure of pyplot unless given.
 
@@ -430,7 +430,7 @@ def items(
     items : sequence of str, optional
         What the items are called; the index of a DataFrame, else their places.
     raters, categories, ordered : optional
-        As of `confusion`.
+        As for `confusion`.
     ax : Axes, optional
         Where it is drawn; on a new figure of pyplot unless given.
 
