@@ -59,7 +59,9 @@ def test_wrong_options_are_one_sentence() -> None:
     with pytest.raises(ParameterError, match='interval: "F" needs every rating'):
         icc([*TABLE_2, [1, 2, 3, None]], interval="F")
     for level in (0.0, 1.0, 95, math.nan):
-        with pytest.raises(ParameterError, match=r"level: needs a number in \(0, 1\), got"):
+        with pytest.raises(
+            ParameterError, match=r"level: needs a number in \(0, 1\), got"
+        ):
             icc(TABLE_2, level=level)
 
 

@@ -102,7 +102,9 @@ def test_limits_that_are_none() -> None:
     with pytest.raises(RatingsError, match=r"need the ratings of two raters, got 3"):
         limits_of([[1, 2, 3], [3, 4, 4]])
     for name in ("share", "level"):
-        with pytest.raises(ParameterError, match=rf"{name}: needs a number in \(0, 1\), got 95"):
+        with pytest.raises(
+            ParameterError, match=rf"{name}: needs a number in \(0, 1\), got 95"
+        ):
             limits_of([[1, 2], [2, 2]], **{name: 95})
 
 
