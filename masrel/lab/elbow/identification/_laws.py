@@ -53,8 +53,9 @@ from masrel.lab.elbow.tone import (
 
 _Floats = NDArray[np.float64]
 
-# Torque is compared in means over so many seconds; the angle's filter passes no more.
-_BIN_S, _WINDOW_S = 0.02, 0.06
+# Torque is compared in means over so many seconds, those of a law over so many times
+# within; the angle's filter passes no more.
+_BIN_S, _WITHIN, _WINDOW_S = 0.02, 4, 0.06
 
 # Evaluations from each start and from the best of them on, and the relative change of
 # the sum of squares, or of the parameters, that ends the search.
@@ -276,15 +277,16 @@ class LawComparison:
 
 
 class _Binned(NamedTuple):
-    # one recording: motion, and at times of it torque and what an arm adds for 1
+    # one recording: its motion and times of it; means of torque, and what an arm adds
     motion: Recorded
-    times: _Floats
+    times: _Floats  # (n_means * _WITHIN,)
     torque: _Floats
-    arm: _Floats  # (n_times, n_terms)
+    arm: _Floats  # (n_means, n_terms), for 1
 
-    def left(self, law: _Floats) -> _Floats:
+    def left(self, law: _Floats, arm: _Floats) -> _Floats:
         # its torque less that of a law up to a constant, as one of equal recordings
-        left = self.torque - law
+        means = law.reshape(-1, _WITHIN).mean(axis=1)
+        left = self.torque - means - self.arm @ arm
         return np.asarray((left - left.mean()) / math.sqrt(left.size))
 
 
@@ -376,10 +378,12 @@ def _binned(movement: Movement, options: Mapping[str, Any]) -> _Binned:
         "gravity_angle": options.get("gravity_angle", 0.0),
     }
     units = [Law(**(arm | {name: 1.0})).arm(part, "") for name in _ARM]
-    used = lost == 0.0
+    used, motion = lost == 0.0, Recorded(time=time, angle=angle)
+    within = n * samples.period * ((np.arange(_WITHIN) + 0.5) / _WITHIN - 0.5)
+    times = (time - time[0])[used][:, None] + within
     return _Binned(
-        motion=Recorded(time=time, angle=angle),
-        times=(time - time[0])[used],
+        motion=motion,
+        times=np.clip(times, 0.0, motion.duration).ravel(),
         torque=torque[used],
         arm=np.stack(units, axis=1)[used],
     )
@@ -418,8 +422,7 @@ def _elbow_left(made: ElbowFit, each: _Binned) -> float:
     joint = replace(joint, range_end=max(joint.range_end, min(highest, math.pi)))
     terms = dict(made.arm) | {e.name: e.value for e in made.estimates}
     arm = [0.0 if terms[name] == "off" else terms[name] for name in _ARM]
-    times = np.minimum(each.times, each.motion.duration)
-    left = each.left(torque(joint, each.motion, times) + each.arm @ np.array(arm))
+    left = each.left(torque(joint, each.motion, each.times), np.array(arm))
     return float(left @ left)
 
 
@@ -442,7 +445,7 @@ def _law_fit(
     def left(x: _Floats, each: _Binned) -> _Floats:
         joint, arm = row.made(x[: len(row.free)].tolist()), fixed.copy()
         arm[fits] = x[len(row.free) :]
-        return each.left(joint.torque(each.motion, each.times) + each.arm @ arm)
+        return each.left(joint.torque(each.motion, each.times), arm)
 
     def residuals(x: _Floats) -> _Floats:
         return np.concatenate([left(x, each) for each in binned])
@@ -463,7 +466,7 @@ def _law_fit(
     best = search(min(tried, key=lambda each: float(each.cost)).x, _EVALUATIONS)
     # what is at an end of its range moves no more, and the others beside it
     is_free = best.active_mask == 0
-    cuts = np.cumsum([each.times.size for each in binned])[:-1]
+    cuts = np.cumsum([each.torque.size for each in binned])[:-1]
     pairs = zip(np.split(best.jac, cuts), np.split(best.fun, cuts), strict=True)
     rows = [Rows(-slopes * is_free, residuals) for slopes, residuals in pairs]
     estimates = _estimates(names, best.x, is_free, rows, options, row.needs)

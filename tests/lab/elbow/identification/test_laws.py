@@ -34,6 +34,9 @@ from masrel.lab.elbow.tone import (
     ToneModel,
 )
 
+# of the elbow's law, which is fitted beside each
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
+
 NOISE, ENCODER = 0.05, math.radians(0.09)
 SPEEDS = (6.0, 7.0, 60.0, 80.0, 100.0, 120.0)  # mean, deg/s
 TRUE: dict[str, JointModel] = {
