@@ -4,8 +4,8 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-EVIDENCE = Path(__file__).parents[1] / "evidence"
-FIGURES = Path(__file__).parents[1] / "figures"
+DOCS = Path(__file__).parents[1]
+EVIDENCE, FIGURES = DOCS / "evidence", DOCS / "figures"
 
 
 def write_rows(name: str, rows: Sequence[Mapping[str, object]]) -> None:

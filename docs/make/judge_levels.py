@@ -11,10 +11,12 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from docs.make.evidence import EVIDENCE, FIGURES, write_rows
+from docs.make.evidence import FIGURES, write_rows
 from masrel.agreement import benjamini_yekutieli
 from masrel.judges import PairedTest
 from masrel.judges._paired import (
@@ -24,12 +26,12 @@ from masrel.judges._paired import (
     region_share,
     rejected,
 )
+from masrel.plots._style import BLUE, ORANGE, VERMILLION, finished, house_style
 
 Row = dict[str, Any]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-ROWS, FIGURE = EVIDENCE / "judges_levels.csv", FIGURES / "judges_levels.png"
 COLUMNS = ("what", "n", "test", "bound", "epsilon", "of", "percent")
 
 TESTS: tuple[PairedTest, ...] = ("exact", "score", "t")
@@ -137,38 +139,34 @@ def _row(*values: Any) -> Row:
     return dict(zip(COLUMNS, (*cell, round(100.0 * float(share), 2)), strict=True))
 
 
-def _of(
-    rows: Sequence[Row], what: str, n: int, test: str, bound: str = "0.05", of: Any = ""
-) -> list[float]:
-    """Return percentages, that of the smallest epsilon first."""
-    cell = [str(value) for value in (what, n, test, bound, of)]
-    names = ("what", "n", "test", "bound", "of")
-    mine = [row for row in rows if [str(row[name]) for name in names] == cell]
-    return [float(row["percent"]) for row in mine]
-
-
 def draw(rows: Sequence[Row]) -> None:
     """Draw levels by the number of items, and how often a judge passes wrongly."""
-    from matplotlib.figure import Figure
-
-    from masrel.plots._style import BLUE, ORANGE, VERMILLION, finished, house_style
-
+    every = (
+        pd.DataFrame(rows)
+        .query("bound == '0.05'")
+        .set_index(["what", "test", "n"])
+        .sort_index()
+    )
     looks = zip(TESTS, ((BLUE, "-"), (ORANGE, "--"), (VERMILLION, ":")), strict=True)
     with house_style():
         figure = Figure(figsize=(7.2, 3.2))
         left, right = figure.subplots(1, 2)
         for test, (colour, style) in looks:
-            levels = [max(_of(rows, "level", n, test)) for n in CURVE]
-            left.plot(CURVE, levels, style, color=colour, label=test)
-            passed = [_of(rows, "passed", n, test, of=3)[0] for _, n in FAMILIES[:4]]
-            at = range(len(passed))
-            right.plot(at, passed, f"o{style}", color=colour)
+            levels = (
+                every.loc["level", test]["percent"]
+                .groupby("n")
+                .max()
+                .loc[CURVE[0] : CURVE[-1]]
+            )
+            left.plot(levels.index, levels, style, color=colour, label=test)
+            passed = every.loc["passed", test].query("of == 3")["percent"]
+            right.plot(passed.index.map(str), passed, f"o{style}", color=colour)
         left.axhline(5.0, color="0.5", linewidth=0.8)
         left.set(xlabel="items", ylabel="true hypotheses rejected (%)", ylim=(0, None))
         right.set(xlabel="items", ylabel="judges that pass wrongly (%)", ylim=(0, None))
-        right.set_xticks(at, [str(n) for _, n in FAMILIES[:4]])
         left.legend()
-        FIGURE.write_bytes(finished(figure, stamp="", forms=("png",))["png"])
+        picture = finished(figure, stamp="", forms=("png",))["png"]
+        (FIGURES / "judges_levels.png").write_bytes(picture)
 
 
 def main() -> None:

@@ -4,18 +4,15 @@
 some ten minutes.
 """
 
-import csv
-import io
 import warnings
 from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.make.evidence import EVIDENCE
+from docs.make.evidence import write_rows
 from masrel.judges import dawid_skene_intervals
 
-TABLE = EVIDENCE / "judges_truth.csv"
 N_SETS, N_RESAMPLES, SEED = 500, 640, 39
 # items of which a share is hard: raters are wrong there in 7 of 10 grades, together
 HARD, WRONG_ON_HARD = 0.2, 0.7
@@ -96,24 +93,15 @@ def measure(cell: Cell, rng: np.random.Generator) -> list[float]:
     ]
 
 
-def row(number: int) -> list[str]:
+def row(number: int) -> dict[str, str]:
     """Return the row of a cell, which depends on nothing but its number."""
     cell, rng = CELLS[number], np.random.default_rng([SEED, number])
     with warnings.catch_warnings(action="ignore"):
         sets = [measure(cell, rng) for _ in range(N_SETS)]
     size = *astuple(cell)[:3], " ".join(map(str, cell.shares)), cell.errors, N_SETS
-    return [*map(str, size), *(f"{mean:.3f}" for mean in np.mean(sets, axis=0))]
-
-
-def main() -> None:
-    rows = []
-    for number in range(len(CELLS)):
-        rows.append(row(number))
-        print(*rows[-1], flush=True)
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([HEAD, *rows])
-    TABLE.write_text(text.getvalue(), encoding="utf-8")
+    means = (f"{mean:.3f}" for mean in np.mean(sets, axis=0))
+    return dict(zip(HEAD, (*map(str, size), *means), strict=True))
 
 
 if __name__ == "__main__":
-    main()
+    write_rows("judges_truth", [row(number) for number in range(len(CELLS))])

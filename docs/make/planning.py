@@ -1,24 +1,21 @@
 """The rows of what came true of plans: ``python -m docs.make.planning``.
 
-Writes ``docs/evidence/planning_*.csv`` and ``docs/figures/planning_error.png``: designs
-that were planned and then simulated anew with another seed, formulas beside them,
-presize and kappaSize beside, and how Monte Carlo error falls with time.
+Writes ``docs/evidence/planning_*.csv``: designs that were planned and then simulated
+again with another seed, formulas, presize and kappaSize beside them.
 """
 
 import json
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from docs.make.evidence import FIGURES, write_rows
+from docs.make.evidence import write_rows
 from masrel.planning import LatentModel, Plan, Study, precision, sample_size
 from masrel.planning._studies import numbers_of, simulated
 from masrel.planning._truth import design_of
 
-FIGURE = FIGURES / "planning_error.png"
 ORACLE = Path(__file__).parents[2] / "tests" / "oracles" / "planning.json"
 TWO, THREE, FOUR = [0.7, 0.3], [0.5, 0.3, 0.2], [0.4, 0.3, 0.2, 0.1]
 
@@ -241,39 +238,8 @@ def of_latent(model: LatentModel) -> float:
     return shown.value
 
 
-def _error_figure() -> None:
-    from matplotlib.figure import Figure
-
-    from masrel.plots._style import BLUE, VERMILLION, finished, house_style
-
-    common = {**DESIGNS[5], "rng": 1}
-    plan = sample_size(Study(**common))
-    with house_style(parse_math=True):
-        figure = Figure(figsize=(5.6, 3.4))
-        axes = figure.subplots()
-        for label, interval, colour, mark in (
-            ("standard error", "t", BLUE, "o-"),
-            ("interval of analyze", "auto", VERMILLION, "s--"),
-        ):
-            seconds, sizes = [], []
-            for n in (100, 300, 1000, 3000) + (
-                (10_000, 100_000) if interval == "t" else ()
-            ):
-                start = time.process_time()
-                _, found = came_true({**common, "interval": interval}, plan, n)
-                seconds.append(time.process_time() - start)
-                sizes.append(found["expected_half_width"])
-            axes.loglog(seconds, sizes, mark, color=colour, label=label)
-        axes.set_xlabel("processor time (s)")
-        axes.set_ylabel("Monte Carlo error of the half-width")
-        axes.legend(frameon=False)
-        axes.grid()
-        FIGURE.write_bytes(finished(figure, stamp="", forms=("png",))["png"])
-
-
 def main() -> None:
-    """Write the rows and the figure."""
-    _error_figure()
+    """Write the rows."""
     write_rows("planning_designs", list(_designs(100_000)))
     write_rows("planning_formulas", list(_formulas(100_000)))
     write_rows("planning_packages", list(_packages()))

@@ -1,31 +1,32 @@
 """Populations have the coefficients that are said of them, and a study repeats."""
 
+from dataclasses import replace
+
 import numpy as np
-import pandas as pd
 import pytest
 
-from docs.make.coverage.defaults import METHODS, deciding
 from docs.make.coverage.populations import Population
-from docs.make.coverage.study import Study
+from docs.make.coverage.rules import METHODS, deciding
+from docs.make.coverage.study import Answer, Cell, rows_of, run
 from masrel.agreement import COEFFICIENTS
 
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 CELLS = deciding()
 
 
-@pytest.mark.parametrize("place", range(7, len(CELLS), 20))
+@pytest.mark.parametrize("place", range(7, len(CELLS), 40))
 def test_a_large_study_has_the_coefficients_of_its_population(place: int) -> None:
     cell = CELLS[place]
-    population = cell.make()
+    make, _, name, _ = cell.ask.args  # type: ignore[attr-defined]
+    population = make()
     codes = population.draw(40_000, np.random.Generator(np.random.PCG64(place)))
     ratings = np.where(codes < 0, np.nan, codes)
     grades = range(population.chances.shape[-1])
-    for name in cell.coefficients:
-        coefficient, _, weights = name.partition(", ")
-        entry, weights = COEFFICIENTS[coefficient], weights or "identity"
-        found = entry(ratings, categories=grades, weights=weights)  # type: ignore[arg-type]
-        off = found.value - population.truth(coefficient, weights)
-        assert abs(off) < 5.5 * found.standard_error  # 2e-6 of 40 others fail
+    coefficient, _, weights = name.partition(", ")
+    entry, weights = COEFFICIENTS[coefficient], weights or "identity"
+    found = entry(ratings, categories=grades, weights=weights)
+    off = found.value - population.truth(coefficient, weights)
+    assert abs(off) < 5.5 * found.standard_error  # 2e-6 of 40 others fail
 
 
 def test_kappa_of_fixed_items_by_hand() -> None:
@@ -42,11 +43,21 @@ def test_kappa_of_fixed_items_by_hand() -> None:
 
 
 def test_a_study_repeats_and_counts_its_studies() -> None:
-    study = Study(name="one", cells=CELLS[4:5], methods=METHODS, seed=1)
-    rows = study.run(3, quiet=True)
-    assert rows.equals(study.run(3, quiet=True))
-    assert len(rows) == len(METHODS) * len(CELLS[4].coefficients)
-    assert (rows["n_defined"] <= 3).all()
-    inside = rows["coverage"] + rows["truth_below"] + rows["truth_above"]
-    assert inside.to_numpy() == pytest.approx(rows["answered"].to_numpy())
-    assert pd.api.types.is_numeric_dtype(rows["width"])
+    cells = [replace(cell, n_studies=3) for cell in CELLS[20:22]]
+    rows = run(cells)
+    assert rows == run(cells, processes=2)
+    assert len(rows) == 2 * len(METHODS)
+    for row in rows:
+        assert row["n_studies"] <= 3
+        kinds = (row[name] for name in ("held", "below", "above", "undefined"))
+        assert sum(kinds) == row["n_studies"]
+
+
+def test_rows_by_hand() -> None:
+    # of four studies one holds the truth, 2, one is below it, one above, one has no end
+    ends = np.array([[1.0, 3.0], [0.0, 1.0], [4.0, 6.0], [np.nan, 1.0]]).T
+    answer = Answer("t", *ends, 2.0, np.array([True, False, False, False]))
+    cell = Cell(at={"n": 5}, ask=lambda *_: [answer], seed=(1,), n_studies=4)
+    counts = {"held": 1, "below": 1, "above": 1, "undefined": 1, "warned": 1}
+    of_all = {"n": 5, "interval": "t", "truth": 2.0, "n_studies": 4}
+    assert rows_of(cell) == [{**of_all, **counts, "width": pytest.approx(5 / 3)}]

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from docs.make import judge_truth
+from docs.make.evidence import EVIDENCE
 from masrel.errors import SmallSampleWarning, UndefinedStatisticWarning
 from masrel.judges import dawid_skene, dawid_skene_intervals, effective_number
 
@@ -261,8 +262,7 @@ def test_a_judge_without_error_is_in_no_pair_and_that_is_said() -> None:
 @pytest.mark.slow
 def test_a_row_of_the_study_of_coverage_repeats() -> None:
     """If it does not: ``python -m docs.make.judge_truth``."""
-    with judge_truth.TABLE.open(encoding="utf-8", newline="") as file:
-        head, *rows = csv.reader(file)
-    assert tuple(head) == judge_truth.HEAD
+    path = EVIDENCE / "judges_truth.csv"
+    rows = list(csv.DictReader(path.read_text("utf-8").splitlines()))
     assert len(rows) == len(judge_truth.CELLS)
     assert judge_truth.row(2) == rows[2]

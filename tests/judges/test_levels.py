@@ -3,7 +3,10 @@
 import csv
 from itertools import islice
 
-from docs.make.judge_levels import ROWS, cluster_rows, exact_rows
+from docs.make.evidence import EVIDENCE
+from docs.make.judge_levels import cluster_rows, exact_rows
+
+ROWS = EVIDENCE / "judges_levels.csv"
 
 
 def test_rows_come_again() -> None:

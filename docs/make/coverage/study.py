@@ -1,157 +1,127 @@
-"""A study of coverage: cells, methods, and what came of them as rows, table and figure.
+"""A study of coverage: cells, and how often the intervals of each hold the truth.
 
-A cell is a population, a number of items and some coefficients; a method is a call of
-the package. Rows go to a CSV, from which all else is made.
+A cell draws studies from its own seed and asks each for intervals. What comes of them
+are rows of one kind, which go to a CSV; tables and figures are made from that.
 """
 
 import warnings
-import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing import get_context
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from tqdm import tqdm
 
-from docs.make.coverage.populations import Population
-from masrel.agreement import COEFFICIENTS, CodedRatings
-from masrel.errors import MasrelError, MasrelWarning
+from docs.make.evidence import table
 from masrel.estimates import Interval
 
-Method = Callable[[str, CodedRatings, str], Interval | None]
-"""From a coefficient, ratings and weights to an interval for other items."""
+Floats = NDArray[np.float64]
+Row = dict[str, Any]
 
 SLACK = 1e-12  # an end at the truth itself, rounded
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
-    """Where studies come from, and what they are asked.
+class Answer(NamedTuple):
+    """An interval by name, the truth, and whether there was a warning.
 
-    `coefficients` are names, with ", quadratic" where they are weighted so.
+    Numbers are of one study, or arrays of many; ends are ``nan`` without an interval.
     """
 
-    family: str
-    population: str  # in words
-    make: Callable[[], Population] = field(repr=False)
-    n_items: int
-    n_raters: int
-    coefficients: Sequence[str]
+    name: str
+    low: float | Floats
+    high: float | Floats
+    truth: float | Floats
+    warned: bool | NDArray[np.bool_] = False
+
+
+def answer(
+    name: str, interval: Interval | None, truth: float, *, warned: bool = False
+) -> Answer:
+    """Return the answer of one study, which may have no interval."""
+    if interval is None or interval.reason is not None:
+        return Answer(name, np.nan, np.nan, truth, warned)
+    return Answer(name, interval.low, interval.high, truth, warned)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Study:
-    """Cells by methods, so many studies each, the same ones in every run."""
+class Cell:
+    """What is in the first columns of its rows, and how its studies are drawn."""
 
-    name: str
-    cells: Sequence[Cell]
-    methods: Mapping[str, Method]
-    seed: int
-
-    def run(
-        self, n_studies: int, *, processes: int = 1, quiet: bool = False
-    ) -> pd.DataFrame:
-        """Return a row per cell, coefficient and method."""
-        parts = [(self, place, n_studies) for place in range(len(self.cells))]
-        bar = tqdm(total=len(parts), disable=quiet, unit="cell")
-        rows: list[dict[str, object]] = []
-        with ProcessPoolExecutor(processes, mp_context=get_context("fork")) as pool:
-            for found in pool.map(_rows_of_cell, parts):
-                rows += found
-                bar.update()
-        return pd.DataFrame(rows)
+    at: Mapping[str, object]
+    ask: Callable[[np.random.Generator, int], Iterable[Answer]]
+    seed: Sequence[int]
+    n_studies: int
 
 
-def _rows_of_cell(part: tuple[Study, int, int]) -> list[dict[str, object]]:
-    study, place, n_studies = part
-    cell = study.cells[place]
-    population = cell.make()
-    key = f"{cell.family} {cell.population} {cell.n_items} {cell.n_raters}"
-    rng = np.random.Generator(np.random.PCG64((study.seed, zlib.crc32(key.encode()))))
-    studies, times = _distinct(
-        population.draw(cell.n_items, rng) for _ in range(n_studies)
-    )
-    scale = tuple(range(population.chances.shape[-1]))
-    rows = []
-    for name in cell.coefficients:
-        coefficient, _, weights = name.partition(", ")
-        weights = weights or "identity"
-        truth = population.truth(coefficient, weights)
-        coded = [CodedRatings(codes=codes, categories=scale) for codes in studies]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MasrelWarning)
-            values = [
-                COEFFICIENTS[coefficient](of, weights=weights).value for of in coded
-            ]
-        defined = np.isfinite(values)
-        for method_name, method in study.methods.items():
-            ends = [
-                _ends(method, coefficient, of, weights) if ok else (np.nan,) * 3
-                for of, ok in zip(coded, defined, strict=True)
-            ]
-            rows.append({
-                "family": cell.family,
-                "population": cell.population,
-                "n_items": cell.n_items,
-                "n_raters": cell.n_raters,
-                "coefficient": name,
-                "truth": truth,
-                "method": method_name,
-                "n_studies": n_studies,
-                **_counted(np.array(ends), truth, times * defined),
-            })  # fmt: skip
-    return rows
+def one_by_one(
+    study: Callable[[np.random.Generator], Iterable[Answer]],
+    rng: np.random.Generator,
+    n_studies: int,
+) -> Iterator[Answer]:
+    """Yield the answers of studies that are drawn one after the other."""
+    for _ in range(n_studies):
+        yield from study(rng)
 
 
-def _distinct(
-    studies: Iterable[np.ndarray],
-) -> tuple[list[np.ndarray], np.ndarray]:
-    # the order of items says nothing, and equal studies are computed once
-    times: dict[bytes, int] = {}
-    first: dict[bytes, np.ndarray] = {}
-    for codes in studies:
-        codes = codes[np.lexsort(codes.T[::-1])]
-        key = codes.tobytes()
-        times[key] = times.get(key, 0) + 1
-        first.setdefault(key, codes)
-    return list(first.values()), np.array(list(times.values()))
+def run(cells: Sequence[Cell], *, processes: int = 1, quiet: bool = True) -> list[Row]:
+    """Return a row per cell and interval."""
+    with ProcessPoolExecutor(processes, mp_context=get_context("fork")) as pool:
+        parts = pool.map(rows_of, cells)
+        bar = tqdm(parts, total=len(cells), disable=quiet, unit="cell")
+        return [row for rows in bar for row in rows]
 
 
-def _ends(
-    method: Method, coefficient: str, ratings: CodedRatings, weights: str
-) -> tuple[float, float, float]:
-    """Return both ends, and whether a warning says that they rest on little."""
-    with warnings.catch_warnings(record=True) as noted:
-        warnings.simplefilter("always")
-        try:
-            interval = method(coefficient, ratings, weights)
-        except MasrelError:
-            interval = None
-    if interval is None or interval.reason is not None:
-        return np.nan, np.nan, 1.0
-    warned = any(issubclass(of.category, MasrelWarning) for of in noted)
-    return interval.low, interval.high, float(warned)
+def rows_of(cell: Cell) -> list[Row]:
+    """Return the rows of a cell, the same ones in every run."""
+    rng = np.random.default_rng(cell.seed)
+    parts = defaultdict[str, list[Floats]](list)
+    with warnings.catch_warnings(action="ignore"):
+        for name, *numbers in cell.ask(rng, cell.n_studies):
+            parts[name].append(np.array(np.broadcast_arrays(*numbers)).reshape(4, -1))
+    return [
+        {**cell.at, "interval": name, **_counted(*np.hstack(of))}
+        for name, of in parts.items()
+    ]
 
 
-def _counted(ends: np.ndarray, truth: float, times: np.ndarray) -> dict[str, float]:
-    """Return shares of the studies with an estimate, and the mean width."""
-    low, high, warned = ends.T
-    n = int(times.sum())
-    exist = np.isfinite(low + high)
-    below, above = truth < low - SLACK, truth > high + SLACK
-    width = np.where(exist, high - low, 0.0)
-    answered = max(int(times @ exist), 1)
+def _counted(low: Floats, high: Floats, truth: Floats, warned: Floats) -> Row:
+    is_given = ~(np.isnan(low) | np.isnan(high))
+    below = is_given & (truth < low - SLACK)
+    above = is_given & (truth > high + SLACK)
     return {
-        "n_defined": n,
-        "coverage": float(times @ (exist & ~below & ~above)) / max(n, 1),
-        "truth_below": float(times @ below) / max(n, 1),
-        "truth_above": float(times @ above) / max(n, 1),
-        "width": float(times @ width) / answered,
-        "answered": float(times @ exist) / max(n, 1),
-        "warned": float(times @ np.nan_to_num(warned)) / max(n, 1),
+        "truth": float(truth.mean()),
+        "n_studies": len(truth),
+        "held": int((is_given & ~below & ~above).sum()),
+        "below": int(below.sum()),
+        "above": int(above.sum()),
+        "undefined": int((~is_given).sum()),
+        "warned": int(warned.sum()),
+        "width": float((high - low)[is_given].sum() / max(is_given.sum(), 1)),
     }
+
+
+def percent(rows: pd.DataFrame) -> pd.Series:
+    """Return coverages in per cent; a study without an interval misses."""
+    return 100.0 * rows["held"] / rows["n_studies"]
+
+
+def crossed(rows: pd.DataFrame, lines: Mapping[str, str]) -> str:
+    """Return what rows show in Markdown, a line a cell and a column an interval.
+
+    `lines` has the columns by which lines differ, with their heads.
+    """
+    keys = [*lines, "interval"]
+    shown = rows.set_index(keys)["shown"].unstack(sort=False).fillna("–")
+    return table(
+        [*lines.values(), *shown.columns],
+        shown.reset_index().astype(object).to_numpy().tolist(),
+        n_text=len(lines),
+    )
 
 
 def monte_carlo_error(coverage: float, n: int) -> float:

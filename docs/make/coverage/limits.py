@@ -1,12 +1,6 @@
-"""How often intervals of limits of agreement with repeats hold the true ones.
-
-``python -m docs.make.limits`` draws studies and writes
-``docs/evidence/limits_coverage.csv``, and the figure of
-``docs/reference/coefficients/limits_with_repeats.md``.
-"""
+"""How often intervals of limits of agreement with repeats hold the true ones."""
 
 import math
-from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from itertools import product
@@ -15,19 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from docs.make.evidence import EVIDENCE, FIGURES, write_rows
+from docs.make.coverage.study import Answer, Cell, answer, one_by_one
 from masrel.agreement import (
     limits_by_clusters,
     limits_with_mean,
     limits_with_repeats,
 )
-from masrel.estimates import Interval
-from masrel.plots import draw
-from masrel.plots._drawn_values import Drawn
 
-ROWS = EVIDENCE / "limits_coverage.csv"
-FIGURE = FIGURES / "limits_with_repeats.png"
-COLUMNS = ("limits", "repeats", "n_items", "errors", "quantity", "n_studies", "n_held")
 SIZES, N_STUDIES, SEED, Z = (10, 20, 50, 100), 2000, 20261130, 1.959963984540054
 BIAS, MEAN, ITEMS, MOVED = 0.3, 50.0, 10.0, 5.0  # the last two are SDs
 # SD of what sets methods (or observers) apart on an item, and of single measurements
@@ -43,14 +31,31 @@ KINDS = {
 }
 # of clusters, of which every one is left out, there are fewer studies
 N_OF_CLUSTERS = 500
-Row = dict[str, Any]
-Held = Iterator[tuple[str, Interval | None, float]]
 
 
-def held(
+def cells() -> list[Cell]:
+    """Return the cells: limits, repeats, items, errors."""
+    every = [
+        (kind, *cell)
+        for kind, repeats in KINDS.items()
+        for cell in product(repeats, SIZES, ERRORS)
+    ]
+    names = ("limits", "repeats", "n_items", "errors")
+    return [
+        Cell(
+            at=dict(zip(names, cell, strict=True)),
+            ask=partial(one_by_one, partial(study, *cell)),
+            seed=(SEED, place),
+            n_studies=N_OF_CLUSTERS if cell[0] == "clusters" else N_STUDIES,
+        )
+        for place, cell in enumerate(every)
+    ]
+
+
+def study(
     kind: str, repeats: str, n: int, errors: str, rng: np.random.Generator
-) -> Held:
-    """Draw a study: what its intervals are of, and the true values."""
+) -> Iterator[Answer]:
+    """Draw a study, and yield its intervals."""
     low, *high = map(int, repeats.split(" to "))
     item = np.arange(n).repeat(rng.integers(low, (high or [low])[0] + 1, n))
     between, within = ERRORS[errors]
@@ -87,20 +92,24 @@ def held(
         result = result.at(MEAN * (1.0 + 0.5 * slope) + 0.5 * BIAS + away)
         bias = BIAS + slope * MEAN + lean * away
         sd = math.sqrt(d2 - of_both * lean + 2.0 * within**2 * (1.0 - 1.0 / low))
-        yield "slope", result.slope_interval, lean
+        yield answer("slope", result.slope_interval, lean)
     if kind == "spread grows":  # there is no slope but by what sets methods apart
         noise = GROWING**2 * (MEAN**2 + ITEMS**2)
         a2 = ITEMS**2 + between**2 / 4.0 + noise / 2.0
-        yield "slope", result.slope_interval, between**2 / 2.0 / a2
+        yield answer("slope", result.slope_interval, between**2 / 2.0 / a2)
         return
-    yield "bias", result.bias_interval, bias
-    yield "limit", result.low_interval, bias - Z * sd
-    yield "limit", result.high_interval, bias + Z * sd
+    yield from _of_limits(result, bias, sd)
+
+
+def _of_limits(result: Any, bias: float, sd: float) -> Iterator[Answer]:
+    yield answer("bias", result.bias_interval, bias)
+    yield answer("limit", result.low_interval, bias - Z * sd)
+    yield answer("limit", result.high_interval, bias + Z * sd)
 
 
 def _with_mean(
     item: Any, values: Any, n_observers: int, errors: str, rng: np.random.Generator
-) -> Held:
+) -> Iterator[Answer]:
     between, within = ERRORS[errors]
     shape = (n_observers, len(item))
     # an observer's own mean, and own view of an item
@@ -111,10 +120,12 @@ def _with_mean(
     frame = pd.DataFrame(dict(zip(names, table, strict=True))).assign(item=item)
     result = limits_with_mean(frame, item="item", observers=names)
     sem = math.sqrt(between**2 + 0.5**2 + within**2)
-    yield "limit", result.limit.interval, Z * math.sqrt(1.0 - 1.0 / n_observers) * sem
+    yield answer(
+        "limit", result.limit.interval, Z * math.sqrt(1.0 - 1.0 / n_observers) * sem
+    )
 
 
-def _in_clusters(n: int, errors: str, rng: np.random.Generator) -> Held:
+def _in_clusters(n: int, errors: str, rng: np.random.Generator) -> Iterator[Answer]:
     # two items in each of n clusters, which share half of what sets methods apart
     between, within = ERRORS[errors]
     cluster, share = np.arange(n).repeat(2), between / math.sqrt(2.0)
@@ -127,58 +138,4 @@ def _in_clusters(n: int, errors: str, rng: np.random.Generator) -> Held:
     frame = pd.DataFrame({"cluster": cluster, "item": range(2 * n), "x": x, "y": y})
     measure = partial(limits_with_repeats, item="item", first="x", second="y")
     result = limits_by_clusters(frame, measure, clusters="cluster")
-    sd = math.sqrt(between**2 + 2.0 * within**2)
-    yield "bias", result.bias_interval, BIAS
-    yield "limit", result.low_interval, BIAS - Z * sd
-    yield "limit", result.high_interval, BIAS + Z * sd
-
-
-def rows(n_studies: int = N_STUDIES, seed: int = SEED, every: int = 1) -> list[Row]:
-    """Return how often every interval holds the true value, by cell."""
-    found = []
-    cells = [
-        (kind, *cell)
-        for kind, repeats in KINDS.items()
-        for cell in product(repeats, SIZES, ERRORS)
-    ]
-    for place, cell in enumerate(cells[::every]):
-        rng = np.random.default_rng([seed, place * every])
-        n, n_held = Counter[str](), Counter[str]()
-        fewer = min(n_studies, N_OF_CLUSTERS)
-        for _ in range(fewer if cell[0] == "clusters" else n_studies):
-            for quantity, ends, true in held(*cell, rng):
-                n[quantity] += 1
-                n_held[quantity] += ends is not None and ends.low <= true <= ends.high
-        found += [
-            dict(zip(COLUMNS, (*cell, of, n[of], n_held[of]), strict=True)) for of in n
-        ]
-    return found
-
-
-def figure() -> bytes:
-    """Return limits on a line, and those of four observers with their mean."""
-    rng = np.random.default_rng(SEED)
-    true = rng.uniform(30.0, 90.0, 40)
-    frame = pd.DataFrame({"item": range(40), "Kim": 1.1 * true + rng.normal(-6, 2, 40)})
-    others = {"Lee": 0.0, "Ann": 1.0, "Bo": -2.0, "Eve": 0.5}
-    for name, own in others.items():
-        frame[name] = true + own + rng.normal(0.0, 2.0, 40)
-    pair, names = ["Kim", "Lee"], ["Lee", "Ann", "Bo", "Eve"]
-    line = limits_with_repeats(
-        frame, item="item", first="Kim", second="Lee", kind="proportional"
-    )
-    mean = limits_with_mean(frame, item="item", observers=names)
-    parts = [("two methods", (pair, line)), ("four observers", (names, mean))]
-    drawn = Drawn("masrel.plots._limits_figure:limits_pictures", (parts, "ml"))
-    return draw(drawn, stamp="", forms=("png",))["png"]
-
-
-def main() -> None:
-    """Draw the studies; write rows and figure."""
-    found = rows()
-    write_rows("limits_coverage", found)
-    FIGURE.write_bytes(figure())
-
-
-if __name__ == "__main__":
-    main()
+    yield from _of_limits(result, BIAS, math.sqrt(between**2 + 2.0 * within**2))
