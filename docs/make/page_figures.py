@@ -11,6 +11,7 @@ COEFFICIENTS = "reference/coefficients"
 PICTURES = {
     "howto/judges": {"judges": "judges_humans", "rates": "judges_corrected"},
     "howto/preferences": {"strengths": "judges_strengths"},
+    "tutorials/judge": {"judge": "tutorial_judge"},
     f"{COEFFICIENTS}/generalizability": {"gstudy": "gstudy"},
     f"{COEFFICIENTS}/limits_with_repeats": {"limits": "limits_with_repeats"},
     f"{COEFFICIENTS}/spans": {"spans": "spans"},

@@ -43,7 +43,9 @@ def test_every_cell_has_a_row(name: str) -> None:
         ("coverage", 90, 40),
         ("limits_coverage", 9, 300),
         ("judges_rates", 9, 4000),
+        ("resampling", 6, 40),
         pytest.param("coverage", 9, 300, marks=LONG),
+        pytest.param("resampling", 1, 200, marks=LONG),
     ],
 )
 def test_other_studies_are_covered_as_often(name: str, every: int, size: int) -> None:

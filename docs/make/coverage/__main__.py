@@ -19,6 +19,7 @@ from docs.make.coverage import (
     kappas_page,
     learning_curve,
     limits,
+    resampling,
     rules,
 )
 from docs.make.coverage.study import Cell, run
@@ -32,6 +33,7 @@ STUDIES: dict[
     "coverage_held_out": (rules.held_out, kappas_page.write_page),
     "icc_coverage": (icc.cells, icc.write_page),
     "judges_rates": (judge_rates.cells, judge_rates.write_figure),
+    "resampling": (resampling.cells, resampling.write_pages),
     "limits_coverage": (limits.cells, None),
     "training_coverage": (learning_curve.cells, learning_curve.write_page),
     "gstudy_coverage": (gstudies.cells, gstudies.write_page),

@@ -5,7 +5,6 @@ What is true of a coefficient is computed from the pairs of raters, not by the p
 """
 
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,18 +50,14 @@ class Population:
             # two raters drawn are independent, and each grades as raters do in the mean
             chances = chances.mean(axis=1, keepdims=True).repeat(2, axis=1)
         q = chances.shape[-1]
-        place = np.arange(q, dtype=np.float64)
-        v = (place[:, None] != place).astype(np.float64)
-        if weights == "quadratic":
-            v = ((place[:, None] - place) / (q - 1)) ** 2
+        apart = np.abs(np.subtract.outer(np.arange(q), np.arange(q))) / (q - 1)
+        v = apart**2 if weights == "quadratic" else np.ceil(apart)
         by_rater = np.einsum("s,srk->rk", self.kinds, chances)
-        pairs = list(combinations(range(len(by_rater)), 2))
-        observed = np.mean([
-            np.einsum("s,sk,sl,kl->", self.kinds, chances[:, i], chances[:, j], v)
-            for i, j in pairs
-        ])  # fmt: skip
+        is_pair = ~np.eye(len(by_rater), dtype=bool)
+        together = np.einsum("s,sik,sjk->ij", self.kinds, chances @ v, chances)
+        observed = together[is_pair].mean()
+        of_pairs = (by_rater @ v @ by_rater.T)[is_pair].mean()
         shares = by_rater.mean(axis=0)
-        of_pairs = np.mean([by_rater[i] @ v @ by_rater[j] for i, j in pairs])
         chance = {
             "percent_agreement": 1.0,
             "brennan_prediger": v.mean(),
@@ -142,17 +137,15 @@ CLASSES = {
 
 def latent_class(shares: Shares, raters: str, n_raters: int) -> Population:
     """Return items with a true grade, which a rater hits or takes for a neighbour."""
-    q = len(shares)
     kinds_of_raters = CLASSES[raters]
-    chances = np.zeros((q, n_raters, q))
+    near = np.eye(len(shares), k=1) + np.eye(len(shares), k=-1)
+    near /= near.sum(axis=1, keepdims=True)
+    chances = []
     for j in range(n_raters):
-        hit = np.full(q, kinds_of_raters[j % len(kinds_of_raters)][1])
-        hit[0] = kinds_of_raters[j % len(kinds_of_raters)][0]
-        for k in range(q):
-            near = [m for m in (k - 1, k + 1) if 0 <= m < q]
-            chances[k, j, near] = (1.0 - hit[k]) / len(near)
-            chances[k, j, k] = hit[k]
-    return Population(kinds=np.array(shares), chances=chances)
+        nothing, something = kinds_of_raters[j % len(kinds_of_raters)]
+        hit = np.array([nothing, *[something] * (len(shares) - 1)])
+        chances.append(np.diag(hit) + (1.0 - hit)[:, None] * near)
+    return Population(kinds=np.array(shares), chances=np.stack(chances, axis=1))
 
 
 def some_careless(shares: Shares, n_drawn: int) -> Population:
