@@ -33,7 +33,7 @@ def check(study: Path) -> None:
 
         problems = [each for checker in _CHECKERS for each in checker(protocol, paths)]
         # What only may happen is for a study of which all else is right.
-        of_device = () if problems else device_notes(protocol)
+        of_device = () if problems else device_notes(protocol, paths)
         notes += [f"{paths.protocol}: {note}" for note in of_device]
         with contextlib.suppress(MasrelError):  # a checker has said it
             notes += concealment_notes(protocol, paths)

@@ -4,37 +4,65 @@ import dataclasses
 import functools
 import math
 import sys
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
 
 import click
+import msgspec
 from tqdm import tqdm
 
 from masrel.cli._commands import Commands
-from masrel.cli._options import STDOUT, OutputOptions, output_options, write_output
+from masrel.cli._options import (
+    STDOUT,
+    OutputOptions,
+    floats,
+    output_options,
+    write_output,
+)
 from masrel.cli._paths import InputFile
+from masrel.lab._event_log import utc_now
 from masrel.lab.cli._study_options import several
+from masrel.lab.conduct._calibrations import (
+    Calibration,
+    write_calibration,
+)
 from masrel.lab.hess import (
+    BackendOptions,
     Clock,
+    Device,
     EmergencyStop,
     RealClock,
     SimulatedClock,
     SimulatedHand,
+    SimulatedOptions,
+    TorqueSensor,
     moteus,
     open_device,
     puck,
 )
+from masrel.lab.hess._calibration import (
+    N_STEPS,
+    GainPoint,
+    carry,
+    fit_gain,
+    measure_free_arm,
+)
 from masrel.lab.hess._can import Link
 from masrel.lab.hess._free_arm import LIMITS, SPEEDS, fit_friction, steady_runs
 from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
+from masrel.lab.hess.device import _distribution
 from masrel.lab.hess.moteus import MoteusOptions
 from masrel.lab.hess.puck import PuckOptions, read_property_table
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.recording import MEASURED_TORQUE
 
 _N_NODES = {"puck": 31, "moteus": 127}
 _BACKENDS: dict[str, ModuleType] = {"puck": puck, "moteus": moteus}
+_SIMULATED = "simulated"
+_GRAVITY = 9.80665  # m/s²
 _UNITS = {"puck": "counts", "moteus": "turns"}  # of a position
 _RANGE_END = math.radians(146.0)  # where an emulated arm meets its end stop
 _EMULATED_START = math.radians(60.0)
@@ -43,10 +71,10 @@ _device_options = several(
     click.option(
         "--device",
         "name",
-        type=click.Choice(list(_BACKENDS)),
+        type=click.Choice([*_BACKENDS, _SIMULATED]),
         default="puck",
         show_default=True,
-        help="Type of amplifier.",
+        help="Type of amplifier; the simulated device has no bus.",
     ),
     click.option(
         "--interface",
@@ -99,7 +127,7 @@ class _Session:
     """An amplifier, and the screen or file that its results go to."""
 
     name: str  # of its backend
-    options: PuckOptions | MoteusOptions  # bus, node and how to treat it
+    options: Any  # of the backend: bus, node and how to treat it
     clock: Clock  # simulated for an emulated one
     # what holds the arm of an emulated one: a hand that has let go
     hand: SimulatedHand | None
@@ -108,6 +136,10 @@ class _Session:
     @property
     def backend(self) -> ModuleType:
         """What brings it up."""
+        if self.name not in _BACKENDS:
+            raise click.UsageError(
+                f"--device {self.name}: has no bus that can be asked"
+            )
         return _BACKENDS[self.name]
 
     def link(self, *, all_nodes: bool = False) -> Link:
@@ -120,6 +152,25 @@ class _Session:
             all_nodes=all_nodes,
         )
         return link
+
+    @contextmanager
+    def moving(self) -> Iterator[tuple[Device, dict[str, Any]]]:
+        """Open it to be moved -> the device, what watches it, and what stops it."""
+        stop = EmergencyStop()
+        keys = None if self.hand is not None else sys.stdin  # an emulator is quick
+        with (
+            stop_on_signals(stop),
+            stop_on_key(stop, keys),
+            open_device(
+                self.name,
+                clock=self.clock,
+                hand=self.hand,
+                range_end=_RANGE_END,
+                options=self.options,
+            ) as device,
+            watched(device, LIMITS.watchdog_time) or nullcontext() as watchdog,
+        ):
+            yield device, {"watchdog": watchdog, "stop": stop}
 
     def progress(self, total: int) -> "tqdm[NoReturn]":
         """Make a bar of steps on a terminal, for a ``with`` block."""
@@ -160,8 +211,11 @@ def _device_command(function: Callable[..., None]) -> Callable[..., None]:
             "direction": 1 if direction == "1" else -1,
             **({} if gear_ratio is None else {"gear_ratio": gear_ratio}),
         }
-        options: PuckOptions | MoteusOptions
-        if name == "moteus":
+        options: BackendOptions
+        if name == _SIMULATED:
+            emulate = True
+            options = SimulatedOptions(torque_sensor=TorqueSensor())
+        elif name == "moteus":
             if properties is not None:
                 raise click.UsageError("--properties is for a puck")
             options = MoteusOptions(servo=node, **settings)
@@ -201,9 +255,9 @@ def device() -> None:
 @_device_command
 def _probe(session: _Session) -> None:
     """Ask every node to identify itself; nothing is set and no node is woken."""
-    n_nodes = _N_NODES[session.name]
+    backend, n_nodes = session.backend, _N_NODES.get(session.name, 0)
     with session.link(all_nodes=True) as link, session.progress(n_nodes) as bar:
-        reports = session.backend.probe(
+        reports = backend.probe(
             link, session.clock, session.options, progress=bar.update
         )
     session.write_output(
@@ -285,45 +339,38 @@ def _emulate(session: _Session) -> None:
         link.peer.run(lambda: stop.reason is not None)
 
 
-@device.command("friction")
-@click.option(
+def _check_free(
+    _context: click.Context, _option: click.Parameter, is_free: bool
+) -> None:
+    if not is_free:
+        raise click.UsageError(
+            "the motor will move the arm; when the arm is free, add --arm-is-free"
+        )
+
+
+_free_arm_option = click.option(
     "--arm-is-free",
     is_flag=True,
+    expose_value=False,
+    callback=_check_free,
     help="Confirm that nobody holds the arm and nothing is in its way: IT WILL MOVE.",
 )
+
+
+@device.command("friction")
+@_free_arm_option
 @_device_command
-def _friction(session: _Session, arm_is_free: bool) -> None:
+def _friction(session: _Session) -> None:
     """Turn the free arm at steady speeds and fit B and β of equation (7).
 
     The motor moves the arm between 40 and 115 deg, at up to 80 deg/s and with at most
     2 N·m, for about 20 s.
     """
-    if not arm_is_free:
-        raise click.UsageError(
-            "the motor will move the arm; when the arm is free, add --arm-is-free"
-        )
-    stop = EmergencyStop()
-    keys = None if session.hand is not None else sys.stdin  # an emulator is quick
     with (
-        stop_on_signals(stop),
-        stop_on_key(stop, keys),
-        open_device(
-            session.name,
-            clock=session.clock,
-            hand=session.hand,
-            range_end=_RANGE_END,
-            options=session.options,
-        ) as device,
-        watched(device, LIMITS.watchdog_time) or nullcontext() as watchdog,
+        session.moving() as (device, watching),
         session.progress(2 * len(SPEEDS)) as bar,
     ):
-        runs = steady_runs(
-            device,
-            session.clock,
-            watchdog=watchdog,
-            stop=stop,
-            progress=bar.update,
-        )
+        runs = steady_runs(device, session.clock, progress=bar.update, **watching)
         estimate = fit_friction(runs)
     session.write_output(
         [
@@ -337,3 +384,121 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
         ],
         dataclasses.asdict(estimate),
     )
+
+
+_study_option = click.option(
+    "--study",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    help="Study whose [device] is meant, instead of the options for a bus.",
+)
+
+
+def _of_study(session: _Session, protocol: Protocol) -> _Session:
+    # the device that a study has, with the hand that moves it if it is simulated
+    from masrel.lab.run._settings import backend_options, has_simulated_hand
+
+    is_emulated = has_simulated_hand(protocol.device)
+    hand = _free_hand() if is_emulated else None
+    return dataclasses.replace(
+        session,
+        name=protocol.device.backend,
+        options=backend_options(protocol.device, hand),
+        clock=SimulatedClock() if is_emulated else RealClock(),
+        hand=hand,
+    )
+
+
+@device.command("calibrate")
+@click.option("--who", required=True, help="Name or initials of who calibrates.")
+@_study_option
+@_free_arm_option
+@click.option(
+    "--mass-kg",
+    callback=lambda _context, _option, text: floats(text) if text else [],
+    help="Masses to hang on the arm one after the other, each way, such as 0.5,1,2.",
+)
+@click.option(
+    "--radius-m",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    help="Distance from the axis at which they pull.",
+)
+@_device_command
+def _calibrate(
+    session: _Session,
+    who: str,
+    study: Path | None,
+    mass_kg: list[float],
+    radius_m: float | None,
+) -> None:
+    """Measure noise, delay, inertia, friction and the gain of torque of a device.
+
+    The free arm first rests for 2 s. Then the motor moves it between 40 and 115 deg for
+    about a minute, with at most 2 N·m. Weights, which it carries between 70 and 85 deg,
+    give the gain; where there is a torque sensor, what it reads counts instead of their
+    masses. With --study the result is written into STUDY/calibrations, and sessions use
+    it.
+    """
+    if mass_kg and radius_m is None:
+        raise click.UsageError("--mass-kg: needs --radius-m")
+    if study is not None:
+        paths = StudyPaths(study)
+        session = _of_study(session, read_protocol(paths.protocol))
+    with session.moving() as (device, watching), session.progress(N_STEPS) as bar:
+        values = measure_free_arm(
+            device, session.clock, progress=bar.update, **watching
+        )
+        has_sensor = MEASURED_TORQUE in device.channels
+    loads = [
+        sign * mass * _GRAVITY * (radius_m or 0.0)
+        for sign in (1.0, -1.0)
+        for mass in mass_kg
+    ]
+    points = [point for load in loads for point in _carried(session, load)]
+    against = "a torque sensor" if has_sensor else "weights"
+    if points:
+        gain = fit_gain(points)
+        values |= {
+            name: values[name].scaled(gain["torque_gain"])
+            for name in ("inertia_kg_m2", "viscous_nms_rad", "coulomb_nm")
+        } | gain
+    calibration = Calibration(
+        device=session.name,
+        boards=_boards(session),
+        distribution=_distribution(session.name),
+        who=who,
+        time_utc=utc_now().isoformat(timespec="seconds"),
+        simulated=not session.options.moves_hardware,
+        gain_from=against if points else None,
+        values={**values},
+    )
+    written = [] if study is None else [f"{write_calibration(paths, calibration)}"]
+    session.write_output(
+        [
+            *calibration.lines,
+            f"gain of torque from {against if points else 'nothing: see --mass-kg'}",
+            *written,
+        ],
+        msgspec.to_builtins(calibration),
+    )
+
+
+def _carried(session: _Session, load: float) -> list[GainPoint]:
+    # with somebody who hangs the weight, or a simulated hand, which needs no telling
+    if session.hand is None:
+        click.pause(
+            f"hang a weight of {abs(load):.3f} N·m so that it "
+            f"{'extends' if load > 0.0 else 'flexes'} the arm, and hold the arm; then "
+            "press a key: the motor takes over at once"
+        )
+    else:
+        session.hand.load = load
+    with session.moving() as (device, watching):
+        return carry(device, session.clock, load, **watching)
+
+
+def _boards(session: _Session) -> list[dict[str, Any]]:
+    if session.name not in _BACKENDS:
+        return []
+    with session.link(all_nodes=True) as link:
+        reports = session.backend.probe(link, session.clock, session.options)
+    return [dataclasses.asdict(report) for report in reports]

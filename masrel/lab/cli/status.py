@@ -37,16 +37,22 @@ def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> 
     no model is named.
     """
     from masrel.lab.conduct import PlanChange
+    from masrel.lab.conduct._calibrations import calibration_notes
     from masrel.lab.progress import study_status
+    from masrel.lab.run._settings import moves_hardware
     from masrel.tables._tables import as_text
 
     stands = study_status(paths, protocol)
+    stands["device"] = [
+        *calibration_notes(paths, protocol, lambda: moves_hardware(protocol.device))
+    ]
     sessions = stands["sessions"]
     problems = (stands["problem"], *(session["problem"] for session in sessions))
     parts = (
         *(each for each in problems if each is not None),
         "\n".join(map(_event_line, stands["events"])),
         "\n".join(str(PlanChange(**each)) for each in stands["plan_changes"]),
+        "\n".join(stands["device"]),
         "next: {command}  ({why})".format(**stands["next"]),
     )
     write_output(

@@ -4,7 +4,11 @@ from masrel.lab.hess._clock import Clock, RealClock, SimulatedClock
 from masrel.lab.hess._course import PresentationStatus, StretchRules
 from masrel.lab.hess._recorder import Fault, Presented, cut_off
 from masrel.lab.hess._replay import ReplayOptions
-from masrel.lab.hess._simulated import SimulatedOptions, TorqueSensor
+from masrel.lab.hess._simulated import (
+    PlantParameters,
+    SimulatedOptions,
+    TorqueSensor,
+)
 from masrel.lab.hess._stop import EmergencyStop
 from masrel.lab.hess.controller import Controller, Friction, FrictionCompensation
 from masrel.lab.hess.device import (
@@ -38,6 +42,7 @@ __all__ = [
     "HumanHand",
     "IdleCommand",
     "MotionHand",
+    "PlantParameters",
     "PresentationStatus",
     "Presented",
     "Reading",

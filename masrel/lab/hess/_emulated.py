@@ -8,7 +8,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from masrel.errors import FrameError, ParameterError
@@ -117,10 +117,9 @@ class InjectedFault:
 class Motor:
     """A simulated arm, driven by a torque or resisted by what an idle motor does."""
 
-    def __init__(self, hand: Hand, range_end: float) -> None:
+    def __init__(self, hand: Hand, range_end: float, arm: PlantParameters) -> None:
         # The quantum is that of the bus
-        parameters = PlantParameters(range_end=range_end, torque_step=0.0)
-        self.plant = Plant(hand, parameters)
+        self.plant = Plant(hand, replace(arm, range_end=range_end, torque_step=0.0))
         self._damping, self._most = 0.0, math.inf  # idle: N·m·s/rad, and N·m
         self._has_moved = self._is_driven = False
 

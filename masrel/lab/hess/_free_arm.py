@@ -9,9 +9,10 @@ import statistics
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
 from masrel.lab.hess._can import Node
@@ -21,6 +22,7 @@ from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
+from masrel.lab.recording import MEASURED_TORQUE
 
 # Before it turns
 
@@ -53,6 +55,8 @@ LIMITS = DeviceLimits(
 _SETTLING_TRAVEL = math.radians(35.0)  # of a run, before it counts as steady
 _MAX_RUN_S = 10.0
 _MIN_TICKS = 100  # of the steady part of a run
+# At each of its ends, which say how far it is from steady
+_ENDS = (slice(None, 20), slice(-20, None))
 _GAIN = 1.0  # N·m·s/rad: with 0.06 kg·m² the speed settles within 0.05 s
 _INTEGRAL_GAIN = 20.0  # N·m/rad: 18 rad/s with that inertia, damped by a half
 _PROBE_TORQUE, _PROBE_S = 0.5, 0.3
@@ -162,10 +166,13 @@ class SteadyRun:
         Mean speed of the steady part, rad/s; negative in flexion.
     torque : float
         Mean torque of the motor in it, N·m, positive in extension.
+    acceleration : float, optional
+        Mean acceleration in it, rad/s².
     """
 
     speed: float
     torque: float
+    acceleration: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,28 +242,36 @@ def steady_runs(
         wrong way, is held or blocked, or is not between 30 and 125 deg to begin with.
         Whoever opened the device closes it: then it is idle.
     """
-    watching = watchdog or Watching()
-    arm = _TurningArm(device, clock, watching, stop or EmergencyStop())
+    arm = TurningArm(device, clock, watchdog, stop)
     arm.check_direction()
-    away = 1.0 if arm.angle < 0.5 * (_LOW_END + _HIGH_END) else -1.0
-    arm.turn(-away * speeds[0])  # to the nearer end
-    runs = []
-    for speed in speeds:
-        for direction in (away, -away):
-            runs.append(_mean_run(arm.turn(direction * speed), direction * speed))
-            progress()
-    device.command(0.0)
-    watching.rest()
-    return tuple(runs)
+    runs = arm.steady_runs(speeds, progress)
+    arm.let_go()
+    return runs
 
 
-def fit_friction(runs: Sequence[SteadyRun]) -> FrictionEstimate:
+def linear_fit(
+    design: NDArray[np.float64], target: NDArray[np.float64]
+) -> tuple[list[float], list[float]]:
+    """Return coefficients and their standard errors from the residuals."""
+    # of n rows of k terms, and n numbers
+    solution, *_ = np.linalg.lstsq(design, target, rcond=None)
+    residuals = target - design @ solution
+    variance = float(residuals @ residuals) / (target.size - solution.size)
+    errors = np.sqrt(variance * np.diag(np.linalg.inv(design.T @ design)))
+    return solution.tolist(), errors.tolist()
+
+
+def fit_friction(
+    runs: Sequence[SteadyRun], *, inertia: float = 0.0
+) -> FrictionEstimate:
     """Fit B and β of equation (7) to steady runs by least squares.
 
     Parameters
     ----------
     runs : sequence of SteadyRun
         At two speeds or more, in both directions.
+    inertia : float, optional
+        Of the free arm, kg·m²: what accelerates it is no friction.
 
     Returns
     -------
@@ -283,7 +298,7 @@ def fit_friction(runs: Sequence[SteadyRun]) -> FrictionEstimate:
     (0.2, 0.1)
     """
     speeds = np.array([run.speed for run in runs])
-    torques = np.array([run.torque for run in runs])
+    torques = np.array([run.torque - inertia * run.acceleration for run in runs])
     # (7) at a steady speed: τ = B θ̇ + β sgn(θ̇), and what acts one way
     design = np.column_stack([speeds, np.sign(speeds), np.ones(len(runs))])
     if len(runs) < 4 or np.linalg.matrix_rank(design) < 3:
@@ -291,12 +306,8 @@ def fit_friction(runs: Sequence[SteadyRun]) -> FrictionEstimate:
             "runs: need four or more, at two speeds and in both directions, "
             f"got {len(runs)}"
         )
-    solution, *_ = np.linalg.lstsq(design, torques, rcond=None)
-    residuals = torques - design @ solution
-    variance = float(residuals @ residuals) / (len(runs) - 3)
-    errors = np.sqrt(variance * np.diag(np.linalg.inv(design.T @ design)))
-    viscous, coulomb, offset = (float(value) for value in solution)
-    viscous_error, coulomb_error, offset_error = (float(value) for value in errors)
+    (viscous, coulomb, offset), errors = linear_fit(design, torques)
+    viscous_error, coulomb_error, offset_error = errors
     return FrictionEstimate(
         viscous=viscous,
         viscous_error=viscous_error,
@@ -308,18 +319,35 @@ def fit_friction(runs: Sequence[SteadyRun]) -> FrictionEstimate:
     )
 
 
-class _TurningArm:
+class Tick(NamedTuple):
+    """What was read and then sent in a tick; times since the arm was taken, s."""
+
+    time_s: float  # when it was read
+    angle: float  # rad
+    velocity: float  # estimated, rad/s
+    measured: float  # by a torque sensor, N·m; nan without one
+    sent_s: float
+    torque: float  # of the motor, N·m, positive in extension
+
+
+class TurningArm:
     """A free arm under speed control, tick by tick."""
 
     def __init__(
-        self, device: Device, clock: Clock, watchdog: Watching, stop: EmergencyStop
+        self,
+        device: Device,
+        clock: Clock,
+        watchdog: Watching | None = None,
+        stop: EmergencyStop | None = None,
+        limits: DeviceLimits = LIMITS,
     ) -> None:
         self._device = device
         self._clock = clock
-        self._watchdog = watchdog
-        self._stop = stop
+        self._watchdog = watchdog or Watching()
+        self._stop = stop or EmergencyStop()
+        self._most = limits.torque
         self._estimate = VelocityEstimate()
-        self._guard = Guard(LIMITS, _PERIOD_NS * 1e-9, has_hand=False)
+        self._guard = Guard(limits, _PERIOD_NS * 1e-9, has_hand=False)
         self._start_ns = self._due_ns = self._sent_ns = clock.now_ns()
         self.angle = math.nan  # until it has been read
         self._velocity = 0.0
@@ -345,25 +373,58 @@ class _TurningArm:
                 "flexes; torque and counts have different signs"
             )
 
-    def turn(self, speed: float) -> list[tuple[float, float]]:
-        # To the end of the range on that side -> speed and torque of each steady tick
-        start_ns, start, integral = self._clock.now_ns(), self.angle, 0.0
+    def steady_runs(
+        self, speeds: Sequence[float], progress: Callable[[], object]
+    ) -> tuple[SteadyRun, ...]:
+        away = 1.0 if self.angle < 0.5 * (_LOW_END + _HIGH_END) else -1.0
+        self.turn(-away * speeds[0])  # to the nearer end
+        runs = []
+        for speed in speeds:
+            for direction in (away, -away):
+                runs.append(mean_run(self.turn(direction * speed), direction * speed))
+                progress()
+        return tuple(runs)
+
+    def turn(
+        self,
+        speed: float,
+        *,
+        ends: tuple[float, float] = (_LOW_END, _HIGH_END),
+        settling: float = _SETTLING_TRAVEL,
+        holds: float = 0.0,
+        pushes: Callable[[float], float] = lambda _time_s: 0.0,
+    ) -> list[Tick]:
+        # To the end of the range on that side -> each tick after so much travel. It
+        # begins with a torque that holds a weight, and adds one of the time to its own.
+        start_ns, start, integral = self._clock.now_ns(), self.angle, holds
         steady = []
-        while self.angle < _HIGH_END if speed > 0.0 else self.angle > _LOW_END:
+        while self.angle < ends[1] if speed > 0.0 else self.angle > ends[0]:
             if self._clock.now_ns() - start_ns > _MAX_RUN_S * 1e9:
                 raise _does_not_turn(speed)
             error = speed - self._velocity
             torque = _GAIN * error + integral
-            if abs(torque) <= _MAX_TORQUE:  # it does not wind up beyond the motor
+            if abs(torque) <= self._most:  # it does not wind up beyond the motor
                 integral += _INTEGRAL_GAIN * error * _PERIOD_NS * 1e-9
-            torque = max(-_MAX_TORQUE, min(_MAX_TORQUE, torque))
-            self._tick(torque)
-            if abs(self.angle - start) > _SETTLING_TRAVEL:
-                steady.append((self._velocity, torque))
+            torque += pushes((self._clock.now_ns() - start_ns) * 1e-9)
+            tick = self._tick(max(-self._most, min(self._most, torque)))
+            if tick is not None and abs(self.angle - start) > settling:
+                steady.append(tick)
         return steady
 
-    def _tick(self, torque_nm: float) -> None:
-        # torque: of the motor, positive in extension
+    def hold(self, torque_nm: float, duration_s: float) -> list[Tick]:
+        # One torque for a while
+        end_ns = self._clock.now_ns() + round(duration_s * 1e9)
+        ticks = []
+        while self._clock.now_ns() < end_ns:
+            ticks.append(self._tick(torque_nm))
+        return [tick for tick in ticks if tick is not None]
+
+    def let_go(self) -> None:
+        self._device.command(0.0)
+        self._watchdog.rest()
+
+    def _tick(self, torque_nm: float) -> Tick | None:
+        # None without a new reading; torque: of the motor, positive in extension
         self._clock.sleep_until_ns(self._due_ns)
         now_ns = self._clock.now_ns()
         self._due_ns = max(self._due_ns, now_ns - _PERIOD_NS) + _PERIOD_NS
@@ -371,34 +432,44 @@ class _TurningArm:
         guard = self._guard
         guard.silence((now_ns - self._sent_ns) * 1e-9)
         try:
-            time_ns, angle, _ = self._device.read()
+            time_ns, angle, channels = self._device.read()
         except DeviceTimeoutError as error:
             guard.no_reading(self._since_start_s(now_ns), str(error))
-            return  # the device holds its torque
+            return None  # the device holds its torque
         time_s = self._since_start_s(time_ns)
         if not guard.is_new(time_s):
             guard.no_reading(
                 self._since_start_s(now_ns), f"one of {time_s:.6f} s again"
             )
-            return
+            return None
         guard.reading(time_s, angle, (self._clock.now_ns() - time_ns) * 1e-9)
         self.angle = angle
         self._velocity = self._estimate.update(time_s, angle)
         guard.speed(self._velocity)
         guard.torque(time_s, torque_nm)
+        sent_s = self._since_start_s(self._clock.now_ns())
         self._device.command(-torque_nm)
         self._sent_ns = now_ns
         self._watchdog.beat()
+        names = self._device.channels
+        sensed = dict(zip(names, channels, strict=True)).get(MEASURED_TORQUE, math.nan)
+        return Tick(time_s, angle, self._velocity, sensed, sent_s, torque_nm)
 
     def _since_start_s(self, time_ns: int) -> float:
         return (time_ns - self._start_ns) * 1e-9
 
 
-def _mean_run(steady: list[tuple[float, float]], speed: float) -> SteadyRun:
+def mean_run(steady: list[Tick], speed: float) -> SteadyRun:
+    """Return the means of a run, or refuse one that was not steady for long."""
     if len(steady) < _MIN_TICKS:
         raise _does_not_turn(speed)
-    mean_speed, mean_torque = np.mean(np.array(steady), axis=0)
-    return SteadyRun(speed=float(mean_speed), torque=float(mean_torque))
+    ticks = np.array(steady)
+    began, ended = (np.mean(ticks[part], axis=0) for part in _ENDS)
+    return SteadyRun(
+        speed=float(np.mean(ticks[:, 2])),
+        torque=float(np.mean(ticks[:, 5])),
+        acceleration=float((ended[2] - began[2]) / (ended[0] - began[0])),
+    )
 
 
 def _does_not_turn(speed: float) -> DeviceError:

@@ -305,8 +305,13 @@ class ActuatorGuard:
     #     τ_motor + B θ̇ + β sgn(θ̇) + I θ̈ with I, B, β of (7)
     # Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370.
 
-    def __init__(self, limits: DeviceLimits, friction: Friction, rate_hz: int) -> None:
+    def __init__(
+        self, limits: DeviceLimits, friction: Friction, rate_hz: int, delay: float
+    ) -> None:
         self._limit, self._friction = limits.actuator_torque, friction
+        # What is sent in a tick acts in the next one, or after so many
+        n_ticks = max(1, round(delay * rate_hz))
+        self._sent = deque([0.0] * n_ticks, maxlen=n_ticks)
         self._gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
         self._rate_hz = rate_hz
         self._residual = 0.0  # measured less expected, N·m, late
@@ -318,6 +323,7 @@ class ActuatorGuard:
     ) -> None:
         """Check what was measured against the torque that was held until then."""
         friction = self._friction
+        self._sent.append(sent)
         acceleration = (velocity - self._speed) * self._rate_hz
         self._speed = velocity
         if math.isnan(measured):  # no fault of the actuator; a sensor may be slower
@@ -327,7 +333,8 @@ class ActuatorGuard:
         self._read_s = time_s
         moved = friction.inertia * acceleration + friction.viscous * velocity
         moved += math.copysign(friction.coulomb, velocity) if velocity else 0.0
-        self._residual += self._gain * (measured - sent - moved - self._residual)
+        moved += self._sent[0]
+        self._residual += self._gain * (measured - moved - self._residual)
         if abs(self._residual) <= self._limit:
             self._within_s = time_s
         elif time_s - self._within_s > _ACTUATOR_S:

@@ -7,7 +7,7 @@ import functools
 import math
 import random
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from masrel.errors import DeviceError, ParameterError
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess.controller import Friction
-from masrel.lab.hess.device import BackendOptions, Device, DeviceSetup, Reading
+from masrel.lab.hess.device import (
+    _NOT_A_KEY,
+    BackendOptions,
+    Device,
+    DeviceSetup,
+    Reading,
+)
 from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.limits import _check_not_negative
 from masrel.lab.recording import MEASURED_TORQUE
@@ -29,35 +35,64 @@ _MAX_NORM = 0.25  # 0.25^15 / 15! is below 1e-21: the series is exact in floats
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantParameters:
-    """What the simulated arm, motor and amplifier are like, in SI units."""
+    """What a simulated arm, its encoder, motor and amplifier are like, in SI units.
 
-    # inertia of the motor and friction, (7)
+    Attributes
+    ----------
+    friction : Friction, optional
+        Inertia of the motor and friction, (7).
+    arm_inertia : float, optional
+        Of forearm and hand of the mannequin, kg·m². Not printed in the source: a rod of
+        0.8 kg and 0.25 m and a hand of 0.3 kg at 0.33 m give 0.05.
+    range_end : float, optional
+        Where the arm meets its end stop, rad; the other one is at 0. `open_device` says
+        where it is.
+    stop_stiffness, stop_damping : float, optional
+        Of both end stops, N·m/rad and N·m·s/rad: 10 N·m move one by 0.03 deg, and the
+        arm does not bounce.
+    torque_step : float, optional
+        Quantum of the commanded torque, N·m; 0 for none. By default one unit of an
+        amplifier with 2700 units to the N·m behind a gear of 18.8:1; an emulated
+        amplifier has that of its bus.
+    lag_time : float, optional
+        Time constant of the current loop, s; 0 for none. Not printed; chosen.
+    delay : float, optional
+        From the command until the current begins to follow, s. Not printed; chosen.
+    encoder_noise : float, optional
+        Standard deviation of what the encoder sees, before its steps, rad.
+    step_ns : int, optional
+        Step of the integration, ns.
+
+    Raises
+    ------
+    ParameterError
+        If `range_end` is no angle of an elbow, or another value is negative.
+    """
+
     friction: Friction = field(default_factory=Friction)
-    # inertia of the mannequin's forearm and hand, kg·m². Not printed in the source: a
-    # rod of 0.8 kg and 0.25 m and a hand of 0.3 kg at 0.33 m give 0.05.
     arm_inertia: float = 0.05
-    # where the arm meets its end stop, rad; the other one is at 0
     range_end: float = math.radians(146.0)
-    # stop_stiffness, stop_damping: of both end stops, N·m/rad and N·m·s/rad: 10 N·m
-    # move one by 0.03 deg, and the arm does not bounce
     stop_stiffness: float = 20_000.0
     stop_damping: float = 50.0
-    # quantum of the commanded torque, N·m; 0 for none. One unit of an amplifier with
-    # 2700 units to the N·m behind a gear of 18.8:1.
     torque_step: float = 18.8 / 2700.0
-    # time constant of the current loop, s; 0 for none. Not printed; chosen.
     lag_time: float = 0.0005
-    # from the command until the current begins to follow, s. Not printed; chosen.
     delay: float = 0.0005
-    step_ns: int = 500_000  # step of the integration, ns
+    encoder_noise: float = 0.0
+    step_ns: int = 500_000
 
     def __post_init__(self) -> None:
-        # The one number here that is set from outside
         if not 0.0 < self.range_end <= math.pi:
             raise ParameterError(
                 "range_end: needs more than 0 and at most 180 degrees, "
                 f"got {self.range_end} rad"
             )
+        _check_not_negative(
+            arm_inertia=self.arm_inertia,
+            torque_step=self.torque_step,
+            lag_time=self.lag_time,
+            delay=self.delay,
+            encoder_noise=self.encoder_noise,
+        )
 
 
 # What one step does. New angle for a unit of angle, of speed, of what the actuator lags
@@ -127,6 +162,7 @@ class Plant:
         self._delay_ns = round(parameters.delay * 1e9)
         self.step_ns = parameters.step_ns
         self._start_ns = self.now_ns = 0
+        self._noise = random.Random(0)
         self._time = 0.0  # of the hand, s
         self.angle = hand.start
         self.velocity = 0.0
@@ -165,10 +201,10 @@ class Plant:
         return self._pull_of(self._arm.arm_inertia) - stop
 
     def _pull_of(self, inertia: float) -> float:
-        # The muscles' torque less what moves the hand and so much of the arm, N·m
-        muscles, of_hand = 0.0, 0.0
+        # Torque of muscles and weight less what moves the hand and so much of the arm
+        muscles, of_hand = self._hand.load, 0.0
         if self._holds:
-            muscles, of_hand = self._muscle_torque(), self._hand.inertia
+            muscles, of_hand = muscles + self._muscle_torque(), self._hand.inertia
         share = (of_hand + inertia) / (self._inertia + of_hand)
         return muscles - share * self._net_torque()
 
@@ -188,10 +224,11 @@ class Plant:
         return driven - resisted
 
     def angle_at(self, now_ns: int) -> float:
-        """Return the angle at a time less than a step ahead, rad."""
+        """Return what an encoder sees less than a step ahead, before its steps, rad."""
         # At the speed of now: within half a step at 100 rad/s² that is right to
         # 0.0007 deg, less than an encoder sees.
-        return self.angle + self.velocity * (now_ns - self.now_ns) * 1e-9
+        angle = self.angle + self.velocity * (now_ns - self.now_ns) * 1e-9
+        return angle + self._noise.gauss(0.0, self._arm.encoder_noise)
 
     def command(self, torque_nm: float, now_ns: int) -> None:
         """Command a torque, which the motor begins to follow after its delay."""
@@ -230,7 +267,7 @@ class Plant:
 
     def _force_at(self, time_s: float) -> float:
         # Torque on the arm that depends on neither its angle nor its speed, N·m
-        force = -self._commanded
+        force = self._hand.load - self._commanded
         if self._holds:
             hand = self._hand
             angle, speed = hand.intended(time_s)
@@ -353,9 +390,12 @@ class SimulatedOptions(BackendOptions):
     ----------
     torque_sensor : TorqueSensor or None, optional
         Its torque sensor; None for none.
+    arm : PlantParameters, optional
+        What its arm is like.
     """
 
     torque_sensor: TorqueSensor | None = None
+    arm: PlantParameters = field(default_factory=PlantParameters, metadata=_NOT_A_KEY)
 
     @property
     def moves_hardware(self) -> bool:
@@ -471,6 +511,6 @@ def build(setup: DeviceSetup) -> SimulatedDevice:
     return SimulatedDevice(
         clock=setup.clock,
         hand=setup.hand,
-        parameters=PlantParameters(range_end=setup.range_end),
+        parameters=replace(options.arm, range_end=setup.range_end),
         sensor=options.torque_sensor,
     )

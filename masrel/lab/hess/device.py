@@ -10,6 +10,7 @@ from importlib.metadata import entry_points
 from types import TracebackType
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
+import masrel
 from masrel._input import listed
 from masrel.errors import DeviceError
 from masrel.lab.hess._clock import Clock
@@ -77,6 +78,11 @@ class Device(ABC):
     is_replay : bool
         Whether what it measures does not come of the torque that it is sent; False by
         default.
+    torque_gain : float
+        How many times the torque that it is sent it gives, as was measured; 1 by
+        default. Commands are divided by it.
+    torque_delay : float
+        How long after a command the torque follows, s, as was measured; 0 by default.
     holds_torque_when_silent : bool or None
         Whether it goes on with its last torque when nothing is sent any more, as after
         a cable comes off. Hardware must say; None, the default, where none moves.
@@ -86,6 +92,8 @@ class Device(ABC):
     simulated: bool
     channels: tuple[Channel, ...] = ()
     is_replay: bool = False
+    torque_gain: float = 1.0
+    torque_delay: float = 0.0
     holds_torque_when_silent: bool | None = None
 
     _state: _State = "new"  # on the class, so that `__del__` always finds one
@@ -161,7 +169,7 @@ class Device(ABC):
         self._needs_to_be_open("command")
         if not math.isfinite(torque_nm):
             raise DeviceError(f"{self.name}: needs a finite torque, got {torque_nm}")
-        self._try("sending a torque", self._send, torque_nm)
+        self._try("sending a torque", self._send, torque_nm / self.torque_gain)
 
     def check(self) -> None:
         """Ask the device whether it still does what it is told.
@@ -393,6 +401,13 @@ def _options_type(name: str) -> type[BackendOptions]:
     """Return what a device can be told: OPTIONS of its module, if it has any."""
     options: type[BackendOptions] = getattr(_backend(name), "OPTIONS", BackendOptions)
     return options
+
+
+def _distribution(name: str) -> str:
+    """Return the distribution that drives a device, with its version."""
+    declared = () if name in _BACKENDS else entry_points(group=_GROUP, name=name)
+    of = next((each.dist for each in declared if each.dist), None)
+    return f"{of.name} {of.version}" if of else f"masrel {masrel.__version__}"
 
 
 def build_device(name: str, setup: DeviceSetup) -> Device:

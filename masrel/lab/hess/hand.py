@@ -55,6 +55,8 @@ class Hand(ABC):
         What of its own moves with the arm that it holds, kg·m².
     yields : bool
         Whether its intention depends on the torque it feels, which `feel` takes.
+    load : float
+        Torque of a weight that hangs on the arm, held or not, N·m; positive extends it.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class Hand(ABC):
     """
 
     inertia: float = 0.0
+    load: float = 0.0
     yields: ClassVar[bool] = False
 
     def __init__(

@@ -273,7 +273,9 @@ class _Ticks:
         self._actuator_guard = None
         if MEASURED_TORQUE in device.channels and not device.is_replay:
             friction, rate_hz = controller.friction, controller.rate_hz
-            self._actuator_guard = ActuatorGuard(limits, friction, rate_hz)
+            self._actuator_guard = ActuatorGuard(
+                limits, friction, rate_hz, device.torque_delay
+            )
         self._estimate = VelocityEstimate()
         self._start_ns = self._sent_ns = 0
         self._n_ticks = 0

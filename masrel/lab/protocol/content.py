@@ -228,6 +228,7 @@ _LATER: dict[str, Any] = {
         "end_ramp_ms": 100.0,
         "post_catch_ramp_ms": 100.0,
         "loose_inertia_kg_m2": 0.06,
+        "calibration_max_days": None,
         "torque_sensor": False,
         "backends": {},
     },
@@ -298,8 +299,8 @@ def presented_hash(protocol: Protocol) -> str:
     Notes
     -----
     Raters, sessions, texts, the analysis plan and the report do not enter: adding
-    a rater or wording a title better makes nobody's drawn schedule stale. Nor does
-    ``device.torque_sensor``, which no rater feels.
+    a rater or wording a title better makes nobody's drawn schedule stale. Nor do
+    ``device.torque_sensor`` and ``device.calibration_max_days``, which no rater feels.
     """
     return hashlib.sha256(presented_content(protocol)).hexdigest()
 
@@ -324,7 +325,9 @@ def presented_content(protocol: Protocol) -> bytes:
         **tables,
         "scale": replaced(protocol.scale, anchors={}),
         "occasions": replaced(protocol.occasions, instructions="", resume="always"),
-        "device": replaced(protocol.device, torque_sensor=False),
+        "device": replaced(
+            protocol.device, torque_sensor=False, calibration_max_days=None
+        ),
     }
     return _canonical(content, ignored=("file", "simulated"))  # numbers are felt
 

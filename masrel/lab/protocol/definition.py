@@ -299,6 +299,7 @@ class DeviceSettings(_Table, frozen=True, kw_only=True):
     full_speed_deg_s: _Positive = 2.0
     slip_speed_drop_deg_s: _Positive = 40.0
     loose_inertia_kg_m2: _Positive = 0.06
+    calibration_max_days: Annotated[int, Meta(ge=0)] | None = None
     torque_sensor: bool = False
     puck_interface: _Text = "socketcan"
     puck_channel: _Text = "can0"

@@ -89,6 +89,9 @@ class StudyPaths:
     published_secret_file = _StudyFile(
         "published_secret.txt", "The same secret once everybody may know it."
     )
+    calibrations = _StudyFile(
+        "calibrations", "The folder of what was measured on the device."
+    )
     training = _StudyFile(
         "training",
         "The folder of training logs and recordings; no rating of the study.",

@@ -9,6 +9,7 @@ from pathlib import Path
 from masrel._input import check_option, listed
 from masrel.lab._event_log import Event
 from masrel.lab.conduct import PlanChange, plan_changes, read_conduct
+from masrel.lab.conduct._calibrations import Calibration, last_calibration
 from masrel.lab.conduct._study_log import conduct_hash
 from masrel.lab.progress import (
     RaterProgress,
@@ -59,6 +60,8 @@ class StudyConduct:
         Whether the ratings of the report are those of the session logs.
     sha256 : str or None
         Of what happened beside the sessions; None for nothing.
+    calibration : tuple of Calibration and str, or None
+        The last of the device, and the hash of its file; None where it has none.
     include : frozenset of str
         What is shown though it is private.
     """
@@ -73,6 +76,7 @@ class StudyConduct:
     has_published_secret: bool
     is_of_ratings: bool
     sha256: str | None
+    calibration: tuple[Calibration, str] | None
     include: frozenset[str]
 
     @property
@@ -97,7 +101,8 @@ class StudyConduct:
         """What the manifest of a report says of it: a hash, and what is shown."""
         sha256 = {} if self.sha256 is None else {"conduct_sha256": self.sha256}
         shown = {"include": " ".join(sorted(self.include))} if self.include else {}
-        return sha256 | shown
+        device = self.calibration and {"calibration_sha256": self.calibration[1]}
+        return sha256 | (device or {}) | shown
 
 
 def study_conduct(
@@ -154,6 +159,7 @@ def study_conduct(
         has_published_secret=study.published_secret_file.is_file(),
         is_of_ratings=bool(begun) and file is None,
         sha256=conduct_hash(study),
+        calibration=last_calibration(study, protocol),
         include=frozenset(include),
     )
 
@@ -172,6 +178,7 @@ def conduct_section(material: Material) -> Iterator[Content]:
     conduct = material.conduct
     if conduct is None:
         return
+    yield from _device_calibration(material, conduct)
     if conduct.events:
         yield _events_table(material, conduct)
     if conduct.corrections:
@@ -184,6 +191,20 @@ def conduct_section(material: Material) -> Iterator[Content]:
             text=f"Left out: {left_out}. masrel report shows each with --include and "
             "the word in parentheses."
         )
+
+
+def _device_calibration(material: Material, conduct: StudyConduct) -> Iterator[Content]:
+    device = material.protocol.device.backend
+    if conduct.calibration is not None:
+        calibration, _ = conduct.calibration
+        yield Paragraph(
+            text=f"{'SIMULATED: ' * calibration.simulated}calibration "
+            f"of the device, {device}, on {calibration.time_utc[:10]}, with intervals "
+            f"of 95 %: {'; '.join(calibration.lines)}. Gain of torque from "
+            f"{calibration.gain_from or 'nothing: it was not measured'}."
+        )
+    elif device != "simulated" and any(not s.simulated for s in conduct.begun):
+        yield Paragraph(text=f"The device, {device}, was never calibrated.")
 
 
 def _flow(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from masrel.lab._study_files import Fact, Facts
+from masrel.lab.conduct._calibrations import Calibration
 from masrel.lab.elbow import JointModel
 from masrel.lab.elbow.tone import _caught
 from masrel.lab.hess import (
@@ -42,9 +43,11 @@ from masrel.lab.recording import (
 from masrel.lab.run._grade_sources import GradeRequest
 from masrel.lab.run._settings import (
     backend_options,
+    calibrated,
     device_limits,
     has_simulated_hand,
     model_controller,
+    use_calibration,
 )
 from masrel.lab.run._simulated_raters import (
     hand_seed,
@@ -167,6 +170,7 @@ def present(
     file: Path,
     stop: EmergencyStop,
     listening: Listening,
+    calibration: tuple[Calibration, str] | None = None,
 ) -> Outcome:
     """Present a model once on the protocol's device and write the recording.
 
@@ -174,6 +178,8 @@ def present(
     """
     # Signals that would end the process, and with a real clock whoever is listened to,
     # can press the emergency stop while the device is open.
+    measured, sha256 = calibration or (None, None)
+    protocol = calibrated(protocol, measured)
     limits = device_limits(protocol.device)
     status = request.status or presentation_status(protocol, request)
     spool = spool_of(file)
@@ -182,8 +188,10 @@ def present(
         if isinstance(clock, RealClock):
             shown = dataclasses.replace(request, status=status, samples=spool)
             stack.enter_context(listening(shown, stop))
-        presented = _on_device(protocol, request, status, clock, limits, stop, spool)
-    return _keep(presented, protocol, request, file)
+        presented = _on_device(
+            protocol, request, status, clock, limits, stop, spool, measured
+        )
+    return _keep(presented, protocol, request, file, sha256)
 
 
 def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome | None:
@@ -215,6 +223,7 @@ def _on_device(
     limits: DeviceLimits,
     stop: EmergencyStop,
     spool: Path,
+    calibration: Calibration | None,
 ) -> Presented:
     settings, stretch = protocol.device, protocol.stretch
     model = request.presentation.model
@@ -239,6 +248,8 @@ def _on_device(
                 ),
             )
         )
+        if calibration is not None:
+            use_calibration(device, calibration)
         watchdog = watched(device, limits.watchdog_time)
         if watchdog is not None:
             stack.enter_context(watchdog)
@@ -306,7 +317,11 @@ def _max_duration_s(
 
 
 def _keep(
-    presented: Presented, protocol: Protocol, request: GradeRequest, file: Path
+    presented: Presented,
+    protocol: Protocol,
+    request: GradeRequest,
+    file: Path,
+    calibration_sha256: str | None = None,
 ) -> Outcome:
     presentation, recording = request.presentation, presented.recording
     facts: dict[str, Fact] = {
@@ -323,6 +338,8 @@ def _keep(
         facts["rehearsal"] = True
     if request.practice:
         facts["practice"] = True
+    if calibration_sha256 is not None:
+        facts["calibration_sha256"] = calibration_sha256
     checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
     return _outcome(recording, protocol, presentation.model, file, checksum)
 

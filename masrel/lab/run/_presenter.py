@@ -17,8 +17,9 @@ from masrel.errors import (
 )
 from masrel.lab._event_log import SessionLog
 from masrel.lab._study_files import Fact, Facts
+from masrel.lab.conduct._calibrations import last_calibration
 from masrel.lab.hess import Clock, EmergencyStop, RealClock, SimulatedClock
-from masrel.lab.protocol import Protocol, protocol_hash
+from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.run._grade_sources import (
     GradeRequest,
     GradeSource,
@@ -56,6 +57,7 @@ class Presenter:
 
     def __init__(
         self,
+        study: StudyPaths,
         protocol: Protocol,
         grades: GradeSource,
         clock: ClockName,
@@ -72,6 +74,7 @@ class Presenter:
         self._occasion = occasion  # what it is for, in messages
         self._named_by = named_by  # fields of a presentation in each of its events
         self._has_schedule = has_schedule  # that says which model it was
+        self._calibration = last_calibration(study, protocol)
         self._shown: Presentation | None = None  # what is asked about
 
     @property
@@ -157,6 +160,7 @@ class Presenter:
             file=file,
             stop=stop,
             listening=getattr(self._grades, "listening", _at_terminal),
+            calibration=self._calibration,
         )
         self._log_presented(request, outcome, file)
         if stop.reason in _TERMINATING:

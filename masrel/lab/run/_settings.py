@@ -9,9 +9,11 @@ import msgspec
 
 from masrel._input import listed
 from masrel.errors import ParameterError
+from masrel.lab.conduct._calibrations import Calibration, calibration_notes
 from masrel.lab.hess import (
     BackendOptions,
     Controller,
+    Device,
     DeviceLimits,
     DeviceSetup,
     Friction,
@@ -24,7 +26,13 @@ from masrel.lab.hess import (
 from masrel.lab.hess._guard import HELD_TIMES
 from masrel.lab.hess._signals import passive_damping
 from masrel.lab.hess.device import _options_type
-from masrel.lab.protocol import DeviceSettings, Model, Protocol, joint_model
+from masrel.lab.protocol import (
+    DeviceSettings,
+    Model,
+    Protocol,
+    StudyPaths,
+    joint_model,
+)
 from masrel.lab.protocol._decode import type_problems
 from masrel.lab.protocol._kinds import DEFAULT_KIND
 
@@ -99,8 +107,8 @@ def _torque_problems(protocol: Protocol, model: Model) -> Iterator[str]:
         yield from _stiffness_problems(settings, *joint.largest_slope(speed=speed))
 
 
-def device_notes(protocol: Protocol) -> Iterator[str]:
-    """Yield what a device does in silence, and where its limits stop a model."""
+def device_notes(protocol: Protocol, study: StudyPaths) -> Iterator[str]:
+    """Yield what a device does in silence, what of its calibration, and its limits."""
     if moves_hardware(settings := protocol.device):
         setup = DeviceSetup(clock=RealClock(), options=backend_options(settings))
         if build_device(settings.backend, setup).holds_torque_when_silent:
@@ -109,6 +117,7 @@ def device_notes(protocol: Protocol) -> Iterator[str]:
                 "when nothing is sent any more, as after a cable comes off: have an "
                 "emergency switch in the supply of its motor within reach"
             )
+    yield from calibration_notes(study, protocol, lambda: moves_hardware(settings))
     yield from _torque_notes(protocol)
 
 
@@ -260,6 +269,29 @@ def model_controller(protocol: Protocol, model: str) -> Controller:
         loose_inertia=settings.loose_inertia_kg_m2,
         rate_hz=settings.rate_hz,
     )
+
+
+def calibrated(protocol: Protocol, calibration: Calibration | None) -> Protocol:
+    """Return a protocol whose device is as it was measured, not as it was assumed."""
+    if calibration is None:
+        return protocol
+    of = calibration.values
+    measured = {
+        "encoder_noise_deg": of["encoder_noise_deg"][0],
+        "loose_inertia_kg_m2": of["inertia_kg_m2"][0],
+        # a share of more friction than there is would make the arm creep
+        "friction_viscous_nms_rad": max(0.0, of["viscous_nms_rad"][1]),
+        "friction_coulomb_nm": max(0.0, of["coulomb_nm"][1]),
+    }
+    device = msgspec.structs.replace(protocol.device, **measured)
+    return msgspec.structs.replace(protocol, device=device)
+
+
+def use_calibration(device: Device, calibration: Calibration) -> None:
+    """Give a device the gain and the delay that were measured on it."""
+    of = calibration.values
+    device.torque_delay = 1e-3 * max(0.0, of["delay_ms"][0])
+    device.torque_gain = of.get("torque_gain", (1.0,))[0]
 
 
 def has_simulated_hand(settings: DeviceSettings) -> bool:

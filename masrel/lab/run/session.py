@@ -252,7 +252,7 @@ class _Runner(Presenter):
         occasion = f"session {schedule.session} of {schedule.rater}"
         named_by = ("code", "position")
         super().__init__(
-            protocol, grades, clock, log, occasion=occasion, named_by=named_by
+            study, protocol, grades, clock, log, occasion=occasion, named_by=named_by
         )
         self._study, self._schedule, self._now = study, schedule, now
         self._scheduled = schedule.presentations

@@ -145,6 +145,7 @@ class _Trainer(Presenter):
         log: SessionLog,
     ) -> None:
         super().__init__(
+            study,
             protocol,
             grades,
             clock,

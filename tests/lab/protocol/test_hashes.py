@@ -81,7 +81,7 @@ WHAT_NO_RATER_MEETS = [
     (("occasions",), {"instructions": "Hold the wrist.", "resume": "ask"}),
     (("sessions", 1, "after"), "test"),
     (("questionnaires",), [QUESTIONNAIRE]),
-    (("device",), {"torque_sensor": True}),
+    (("device",), {"torque_sensor": True, "calibration_max_days": 90}),
     (("report", "title"), "Another"),
 ]
 WHAT_PROTOCOLS_ALWAYS_HAD = [

@@ -25,6 +25,7 @@ from masrel.lab.hess.moteus._moteus_options import (
     FIRMWARE,
     FREE,
     HOME_STATE,
+    SERIAL_NUMBER,
     SET_POSITION,
     TIMEOUT,
     MoteusOptions,
@@ -48,6 +49,8 @@ class ServoReport:
         Its number.
     firmware : str
         Version.
+    serial : str
+        Serial number of the board.
     home_state : int
         2 where it knows where its output is.
     volts, celsius : float
@@ -58,6 +61,7 @@ class ServoReport:
 
     servo: int
     firmware: str
+    serial: str
     home_state: int
     volts: float
     celsius: float
@@ -116,10 +120,12 @@ def probe(
 def _report(servo: Servo, number: int) -> ServoReport:
     (version,) = servo.get(INT32, FIRMWARE, patience_s=_PROBE_PATIENCE_S)
     home_state, volts, celsius, code = servo.get(INT8, HOME_STATE, 4)
+    serial = servo.get(INT32, SERIAL_NUMBER, 3)
     major, minor, micro = int(version).to_bytes(4, "big")[1:]
     return ServoReport(
         servo=number,
         firmware=f"{major}.{minor}.{micro}",
+        serial="-".join(f"{int(part) % 2**32:08x}" for part in serial),
         home_state=int(home_state),
         volts=volts,
         celsius=celsius,

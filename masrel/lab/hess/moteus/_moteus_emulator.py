@@ -90,7 +90,7 @@ class MoteusEmulator(EmulatedAmplifier):
             link=link,
             clock=clock,
             faults=emulation.faults,
-            motor=Motor(hand, range_end),
+            motor=Motor(hand, range_end, emulation.arm),
             counts_per_turn=_COUNTS_PER_TURN,
             address=options.servo,
         )

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, Self
 from masrel.errors import ParameterError
 from masrel.lab.hess._can import BusOptions, check_direction
 from masrel.lab.hess._emulated import InjectedFault
+from masrel.lab.hess._simulated import PlantParameters
 from masrel.lab.hess.device import _NOT_A_KEY
 from masrel.lab.hess.limits import _check_positive
 
@@ -73,6 +74,8 @@ class MoteusEmulatorOptions:
         without limit.
     lowest_angle_deg, highest_angle_deg : float
         The elbow's angles of its bounds of position; ``nan`` for none.
+    arm : PlantParameters
+        What its arm is like.
     faults : tuple of InjectedFault
         What fails, and when.
     """
@@ -81,6 +84,7 @@ class MoteusEmulatorOptions:
     timeout_mode: int = FREE
     lowest_angle_deg: float = -4.0
     highest_angle_deg: float = 150.0
+    arm: PlantParameters = field(default_factory=PlantParameters)
     faults: tuple[InjectedFault, ...] = ()
 
 

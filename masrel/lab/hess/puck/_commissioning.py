@@ -28,6 +28,7 @@ from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
     READY,
     ROLE,
+    SERIAL_NUMBER,
     STATUS,
     VERSION,
     PropertyTable,
@@ -65,6 +66,8 @@ class NodeReport:
         Whether this driver can drive it.
     properties : dict of str to int
         Other values that it reports, while it is awake and supported.
+    serial : int or None
+        Serial number; None where it is in error.
     """
 
     puck: int
@@ -73,6 +76,7 @@ class NodeReport:
     firmware: int | None
     is_supported: bool
     properties: dict[str, int]
+    serial: int | None = None
 
     def __str__(self) -> str:
         if self.firmware is None:
@@ -155,6 +159,7 @@ def _node_report(node: PuckNode, properties: PropertyTable | None) -> NodeReport
         firmware=firmware,
         is_supported=bool(numbers),
         properties={name: node.get(numbers[name]) for name in reported},
+        serial=node.get(SERIAL_NUMBER),
     )
 
 

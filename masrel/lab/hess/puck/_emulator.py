@@ -85,7 +85,7 @@ class PuckEmulator(EmulatedAmplifier):
             link=link,
             clock=clock,
             faults=options.faults,
-            motor=Motor(hand, range_end),
+            motor=Motor(hand, range_end, options.arm),
             counts_per_turn=options.counts_per_turn,
             address=puck,  # as the host is node 0
         )

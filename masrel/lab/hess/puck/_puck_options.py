@@ -15,6 +15,7 @@ from masrel.errors import DeviceError, ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
 from masrel.lab.hess._can import BusOptions, check_direction
 from masrel.lab.hess._emulated import InjectedFault
+from masrel.lab.hess._simulated import PlantParameters
 from masrel.lab.hess.device import _NOT_A_KEY
 from masrel.lab.hess.limits import _check_not_negative, _check_positive
 
@@ -311,6 +312,8 @@ class EmulatorOptions:
         Damping by the windings while it is idle, N·m·s/rad at the elbow; chosen.
     properties : PropertyTable or None
         Numbers of its properties; None for those of its firmware.
+    arm : PlantParameters
+        What its arm is like.
     faults : tuple of InjectedFault
         What fails, and when.
 
@@ -331,6 +334,7 @@ class EmulatorOptions:
     direction: Literal[1, -1] = 1
     braking: float = 1.0
     properties: PropertyTable | None = None
+    arm: PlantParameters = field(default_factory=PlantParameters)
     faults: tuple[InjectedFault, ...] = ()
 
     def __post_init__(self) -> None:

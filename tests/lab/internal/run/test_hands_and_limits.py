@@ -200,7 +200,10 @@ def test_a_device_has_a_table_of_its_own_in_the_protocol(
 
 def test_what_a_motor_does_in_silence_is_said(small: Small) -> None:
     of_puck = msgspec.structs.replace(small[1], device=puck())
-    (note, *_), usual = device_notes(of_puck), [*device_notes(small[1])]
+    (note, never, *_), usual = (
+        [*device_notes(protocol, small[0])] for protocol in (of_puck, small[1])
+    )
+    assert never == 'device.backend: "puck" was never calibrated for this study'
     assert note.startswith('device.backend: "puck" goes on with its last torque')
     assert not [note for note in usual if "backend" in note]
 
