@@ -31,6 +31,7 @@ from masrel.lab._study_files import (
 )
 
 __all__ = [
+    "ESTIMATED_TORQUE",
     "MEASURED_TORQUE",
     "PHASES",
     "RAMPS",
@@ -124,6 +125,9 @@ class Channel:
 
 MEASURED_TORQUE = Channel(name="measured_torque", unit="nm")
 """Torque with which the device resists extension, as its sensor reads it."""
+
+ESTIMATED_TORQUE = Channel(name="estimated_torque", unit="nm")
+"""The same, as an amplifier estimates it from its current."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,5 +1,6 @@
 """``masrel device``: bring an amplifier up on its CAN bus and see what it says."""
 
+import csv
 import dataclasses
 import functools
 import math
@@ -12,6 +13,7 @@ from typing import Any, NoReturn
 
 import click
 import msgspec
+import numpy as np
 from tqdm import tqdm
 
 from masrel.cli._commands import Commands
@@ -23,17 +25,22 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.cli._paths import InputFile
+from masrel.errors import DeviceError
 from masrel.lab._event_log import utc_now
 from masrel.lab.cli._study_options import several
 from masrel.lab.conduct._calibrations import (
     Calibration,
+    last_calibration,
     write_calibration,
 )
+from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     BackendOptions,
     Clock,
+    Controller,
     Device,
     EmergencyStop,
+    Friction,
     RealClock,
     SimulatedClock,
     SimulatedHand,
@@ -42,6 +49,7 @@ from masrel.lab.hess import (
     moteus,
     open_device,
     puck,
+    run_presentation,
 )
 from masrel.lab.hess._calibration import (
     N_STEPS,
@@ -51,13 +59,22 @@ from masrel.lab.hess._calibration import (
     measure_free_arm,
 )
 from masrel.lab.hess._can import Link
+from masrel.lab.hess._fidelity import compare_models, lateness_ms, rendered
 from masrel.lab.hess._free_arm import LIMITS, SPEEDS, fit_friction, steady_runs
 from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
 from masrel.lab.hess.device import _distribution
 from masrel.lab.hess.moteus import MoteusOptions
 from masrel.lab.hess.puck import PuckOptions, read_property_table
-from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.recording import MEASURED_TORQUE
+from masrel.lab.protocol import DeviceSettings, Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol.study import _home
+from masrel.lab.recording import MEASURED_TORQUE, Recording
+from masrel.lab.run._settings import (
+    backend_options,
+    calibrated,
+    device_limits,
+    has_simulated_hand,
+    use_calibration,
+)
 
 _N_NODES = {"puck": 31, "moteus": 127}
 _BACKENDS: dict[str, ModuleType] = {"puck": puck, "moteus": moteus}
@@ -66,6 +83,7 @@ _GRAVITY = 9.80665  # m/s²
 _UNITS = {"puck": "counts", "moteus": "turns"}  # of a position
 _RANGE_END = math.radians(146.0)  # where an emulated arm meets its end stop
 _EMULATED_START = math.radians(60.0)
+_START = math.radians(30.0)  # of a stretch
 
 _device_options = several(
     click.option(
@@ -395,8 +413,6 @@ _study_option = click.option(
 
 def _of_study(session: _Session, protocol: Protocol) -> _Session:
     # the device that a study has, with the hand that moves it if it is simulated
-    from masrel.lab.run._settings import backend_options, has_simulated_hand
-
     is_emulated = has_simulated_hand(protocol.device)
     hand = _free_hand() if is_emulated else None
     return dataclasses.replace(
@@ -502,3 +518,125 @@ def _boards(session: _Session) -> list[dict[str, Any]]:
     with session.link(all_nodes=True) as link:
         reports = session.backend.probe(link, session.clock, session.options)
     return [dataclasses.asdict(report) for report in reports]
+
+
+@device.command("fidelity")
+@_study_option
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0.01, 1440.0),
+    default=0.05,
+    show_default=True,
+    help="How long the loop runs in real time, to see how late its ticks are.",
+)
+@_device_command
+def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
+    """Compare the torque that a device gives with the one that is asked for.
+
+    A simulated hand makes the 32 stretches of Table V of Park, Kim and Damiano (2012),
+    of the models HM1 to HM4, or a person does, whom the command tells each time. Then
+    the loop runs in real time on an arm that is held still.
+    """
+    settings, calibration = DeviceSettings(), None
+    if study is not None:
+        paths = StudyPaths(study)
+        protocol = read_protocol(paths.protocol)
+        session = _of_study(session, protocol)
+        calibration, _ = last_calibration(paths, protocol) or (None, "")
+        settings = calibrated(protocol, calibration).device
+    if isinstance(session.options, MoteusOptions):
+        options = dataclasses.replace(session.options, estimates_torque=True)
+        session = dataclasses.replace(session, options=options)
+    present = functools.partial(_presented, session, settings, calibration)
+    table_v = (_home() / "hess2012" / "ratings" / "published.csv").read_text("utf-8")
+    rows, stretches = [*csv.DictReader(table_v.splitlines())], []
+    with session.progress(len(rows)) as bar:
+        for row in rows:
+            speed = float(row["mean_speed_deg_s"])
+            known = rendered(present(row["model"], speed_deg_s=speed))
+            stretches.append(
+                {"model": row["model"], "mean_speed_deg_s": speed, **known}
+            )
+            bar.update()
+    n_parts = math.ceil(minutes)
+    parts = [present("HM1", still_s=60.0 * minutes / n_parts) for _ in range(n_parts)]
+    late = lateness_ms(parts, settings.rate_hz)
+    late_ms = np.percentile(late, (50, 99, 99.9, 100)).tolist()
+    n_missed = sum(int(part.facts["n_missed_ticks"] or 0) for part in parts)
+    faults = [str(part.facts["fault"]) for part in parts if part.facts["fault"]]
+    models, compared = compare_models(stretches)
+    session.write_output(
+        [
+            *compared,
+            "ticks in real time, ms late: median {:.3f}, 99 % {:.3f}, 99.9 % {:.3f}, "
+            "all {:.3f}; missed {} of {}".format(
+                *late_ms, n_missed, n_missed + late.size
+            ),
+            *(f"a minute was stopped: {fault}" for fault in faults),
+        ],
+        {
+            "models": models,
+            "stretches": stretches,
+            "minutes": minutes,
+            "late_ms": dict(zip(("p50", "p99", "p999", "max"), late_ms, strict=True)),
+            "n_missed_ticks": n_missed,
+            "faults": faults,
+        },
+    )
+
+
+def _presented(
+    session: _Session,
+    settings: DeviceSettings,
+    calibration: Calibration | None,
+    model: str,
+    *,
+    speed_deg_s: float = 90.0,
+    still_s: float | None = None,
+) -> Recording:
+    # A stretch; or an arm that is held still for so long, in real time
+    clock, hand = session.clock, None
+    if session.hand is not None:
+        clock = SimulatedClock() if still_s is None else RealClock()
+        hand = SimulatedHand(
+            start=_START,
+            end=_RANGE_END,
+            mean_speed=math.radians(speed_deg_s),
+            delay=0.05 if still_s is None else 1e6,
+        )
+    elif still_s is None:
+        click.pause(
+            f"{model}: press a key, then stretch the arm from 30 deg at a mean of "
+            f"{speed_deg_s:.0f} deg/s"
+        )
+    options = session.options.emulated(_START) if hand else session.options
+    friction = Friction(
+        viscous=settings.friction_viscous_nms_rad, coulomb=settings.friction_coulomb_nm
+    )
+    controller = Controller(
+        STANDARD_MODELS[model],
+        start_angle=_START,
+        friction=friction,
+        compensation=settings.friction_compensation,
+        rate_hz=settings.rate_hz,
+    )
+    limits = device_limits(settings)
+    if still_s is not None:  # what is late is to be counted
+        limits = dataclasses.replace(limits, missed_ticks=1_000_000)
+    used = dataclasses.replace(session, clock=clock, hand=hand, options=options)
+    with used.moving() as (device, watching):
+        if calibration is not None:
+            use_calibration(device, calibration)
+        presented = run_presentation(
+            device,
+            controller,
+            clock=clock,
+            limits=limits,
+            rate_hz=settings.rate_hz,
+            max_duration_s=still_s,
+            end_angle=_RANGE_END,
+            **watching,
+        )
+    if presented.fault is not None and still_s is None:
+        raise DeviceError(f"{model}: {presented.fault.message}")
+    return presented.recording

@@ -99,22 +99,22 @@ def measure_free_arm(
     viscous = fit_friction(runs).viscous
     fits = (_pulsed_fit(ticks, viscous) for ticks in pulsed)
     delays, inertias = zip(*fits, strict=True)
-    inertia = _mean(inertias)
+    inertia = mean_of(inertias)
     friction = fit_friction(runs, inertia=inertia.value)
     df = len(runs) - 3
     angles = [tick.angle for ticks in (rest, *pulsed) for tick in ticks]
     noise = encoder_noise([tick.angle for tick in rest], step=_step(angles))
     return {
         "encoder_noise_deg": Measured(*map(math.degrees, noise)),
-        "delay_ms": Measured(*(1e3 * delay for delay in _mean(delays))),
+        "delay_ms": Measured(*(1e3 * delay for delay in mean_of(delays))),
         "inertia_kg_m2": inertia,
         "viscous_nms_rad": _measured(friction.viscous, friction.viscous_error, df),
         "coulomb_nm": _measured(friction.coulomb, friction.coulomb_error, df),
     }
 
 
-def _mean(values: Sequence[float]) -> Measured:
-    # Of runs that are independent of each other
+def mean_of(values: Sequence[float]) -> Measured:
+    """Return the mean of runs that are independent of each other."""
     error = float(np.std(values, ddof=1)) / math.sqrt(len(values))
     return _measured(float(np.mean(values)), error, len(values) - 1)
 

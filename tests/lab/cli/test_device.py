@@ -185,3 +185,51 @@ def test_the_whole_flow_runs_on_an_emulated_moteus(
     assert len(facts) == 8
     assert {one["device"] for one in facts} == {"moteus"}
     assert all(one["simulated"] and one["fault"] is None for one in facts)
+
+
+CALIBRATE = ("device", "calibrate", "--device", "simulated", "--who", "Kim")
+
+
+def test_calibrate_does_not_move_an_arm_unasked(masrel: Caller) -> None:
+    done = masrel(*CALIBRATE)
+    assert (done.code, "add --arm-is-free" in done.err) == (2, True)
+    done = masrel(*CALIBRATE, "--arm-is-free", "--mass-kg", "1")
+    assert (done.code, "--mass-kg: needs --radius-m" in done.err) == (2, True)
+    done = masrel("device", "probe", "--device", "simulated")
+    assert (done.code, "has no bus that can be asked" in done.err) == (2, True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("device", "against"), [("moteus", "weights"), ("simulated", "a torque sensor")]
+)
+def test_a_device_of_a_study_is_calibrated_and_its_torque_compared(
+    masrel: Caller, tmp_path: Path, device: str, against: str
+) -> None:
+    study = tmp_path / "study"
+    masrel("init", study)
+    protocol = study / "protocol.toml"
+    table = {"moteus": 'interface = "virtual"', "simulated": "torque_sensor = {}"}
+    own = f'[device]\nbackend = "{device}"\n\n[device.{device}]\n{table[device]}\n'
+    text = protocol.read_text(encoding="utf-8")
+    before, _, after = text.partition("[device]\n")
+    rest = after[after.index("\n[") :]
+    protocol.write_text(f"{before}{own}{rest}", encoding="utf-8")
+    weights = ("--mass-kg", "0.5,1", "--radius-m", "0.25", "--json", "-")
+    command = ("device", "calibrate", "--who", "Kim", "--arm-is-free", *weights)
+    done = masrel(*command, "--study", study)
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    value, low, high = document["values"]["torque_gain"]
+    assert low <= value <= high
+    assert value == pytest.approx(1.0, abs=0.005)
+    assert (document["simulated"], document["gain_from"]) == (True, against)
+    (file,) = (study / "calibrations").glob(f"{device}_*.json")
+    assert json.loads(file.read_text("utf-8"))["values"] == document["values"]
+    if device == "moteus":
+        assert document["boards"][0]["serial"] == "00001267-00000000-00000000"
+    done = masrel("device", "fidelity", "--study", study, "--json", "-")
+    document = json.loads(done.out)
+    assert set(document["models"]) == {"HM1", "HM2", "HM3", "HM4"}
+    assert len(document["stretches"]) == 32
+    assert document["simulated"] is True

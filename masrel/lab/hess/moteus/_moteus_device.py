@@ -71,6 +71,7 @@ from masrel.lab.hess.moteus._moteus_options import (
     WATCHDOG,
     MoteusOptions,
 )
+from masrel.lab.recording import ESTIMATED_TORQUE
 
 _QUERY = (
     Subframe(READ, INT8, MODE),
@@ -301,6 +302,7 @@ class MoteusDevice(CanDevice[MoteusOptions]):
 
     def __init__(self, setup: DeviceSetup, options: MoteusOptions) -> None:
         super().__init__(setup, options, connected)
+        self.channels = (ESTIMATED_TORQUE,) if options.estimates_torque else ()
         self._driven_ns: int | None = None  # since when it has been told torques
         self._commanded_ns = 0  # when it was told the last
         self._commanded: deque[float] = deque([0.0], maxlen=_TOLD_TICKS)  # N·m
@@ -318,7 +320,10 @@ class MoteusDevice(CanDevice[MoteusOptions]):
             self._has_let_go = True
             raise
         self._check_torque(state)
-        return Reading(state.time_ns, self._options.angle(state.position))
+        # It believes its own constant of the motor, whose error is the gain
+        estimate = self.torque_gain * self._options.torque(state.torque_nm)
+        channels = (estimate,) if self.channels else ()
+        return Reading(state.time_ns, self._options.angle(state.position), channels)
 
     def _latest(self) -> State:
         servo = self._servo

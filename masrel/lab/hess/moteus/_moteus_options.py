@@ -112,6 +112,8 @@ class MoteusOptions(BusOptions):
         After so long a silence it lets go by itself.
     patience_s : float
         How long to wait for an answer, s: one period of the loop.
+    estimates_torque : bool
+        Whether its own estimate of its torque is recorded.
     emulator : MoteusEmulatorOptions or None
         For an emulated moteus on a bus inside this process: what it is like.
 
@@ -131,6 +133,7 @@ class MoteusOptions(BusOptions):
     largest_torque_nm: float = 20.0
     watchdog_ms: float = 20.0
     patience_s: float = 0.001
+    estimates_torque: bool = False
     emulator: MoteusEmulatorOptions | None = field(default=None, metadata=_NOT_A_KEY)
 
     def __post_init__(self) -> None:
