@@ -33,19 +33,19 @@ def rendered(recording: Recording) -> dict[str, float]:
     if channel is None:
         return {}
     columns = {n: c[: recording.n_presented] for n, c in recording.columns.items()}
-    time, given = columns["time_s"], columns[channel.column]
+    time, felt = columns["time_s"], columns[channel.column]
     goal = columns[_COMPARED[channel]]
-    difference = given - goal
+    difference = felt - goal
     velocity = np.radians(columns["velocity_deg_s"])
     friction = np.column_stack(
         [velocity, np.sign(velocity), np.gradient(velocity, time)]
     )
-    rows = np.isfinite(given)
+    rows = np.isfinite(felt)
 
     def square(delay: float) -> float:
         # What neither the torque sent so much earlier nor (7) explains
         sent = np.interp(time - delay, time, columns["command_torque_nm"])
-        left = (given - sent)[rows]
+        left = (felt - sent)[rows]
         moved = np.linalg.lstsq(friction[rows], left, rcond=None)[0]
         return float(np.sum((left - friction[rows] @ moved) ** 2))
 
