@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
@@ -16,6 +17,7 @@ import msgspec
 import numpy as np
 from tqdm import tqdm
 
+import masrel
 from masrel.cli._commands import Commands
 from masrel.cli._options import (
     STDOUT,
@@ -62,7 +64,8 @@ from masrel.lab.hess._can import Link
 from masrel.lab.hess._fidelity import compare_models, lateness_ms, rendered
 from masrel.lab.hess._free_arm import LIMITS, SPEEDS, fit_friction, steady_runs
 from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
-from masrel.lab.hess.device import _distribution
+from masrel.lab.hess.device import _BACKENDS as _OWN
+from masrel.lab.hess.device import _GROUP
 from masrel.lab.hess.moteus import MoteusOptions
 from masrel.lab.hess.puck import PuckOptions, read_property_table
 from masrel.lab.protocol import DeviceSettings, Protocol, StudyPaths, read_protocol
@@ -510,6 +513,13 @@ def _carried(session: _Session, load: float) -> list[GainPoint]:
         session.hand.load = load
     with session.moving() as (device, watching):
         return carry(device, session.clock, load, **watching)
+
+
+def _distribution(name: str) -> str:
+    # What drives a device, with its version
+    declared = () if name in _OWN else entry_points(group=_GROUP, name=name)
+    of = next((each.dist for each in declared if each.dist), None)
+    return f"{of.name} {of.version}" if of else f"masrel {masrel.__version__}"
 
 
 def _boards(session: _Session) -> list[dict[str, Any]]:

@@ -40,7 +40,7 @@ class Calibration(msgspec.Struct, frozen=True, kw_only=True):
     def lines(self) -> list[str]:
         """A line for each number."""
         return [
-            f"{name} {value:.4g} [{low:.4g}, {high:.4g}]"
+            f"{name} {value:.5g} [{low:.5g}, {high:.5g}]"
             for name, (value, low, high) in self.values.items()
         ]
 

@@ -10,7 +10,6 @@ from importlib.metadata import entry_points
 from types import TracebackType
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
-import masrel
 from masrel._input import listed
 from masrel.errors import DeviceError
 from masrel.lab.hess._clock import Clock
@@ -401,13 +400,6 @@ def _options_type(name: str) -> type[BackendOptions]:
     """Return what a device can be told: OPTIONS of its module, if it has any."""
     options: type[BackendOptions] = getattr(_backend(name), "OPTIONS", BackendOptions)
     return options
-
-
-def _distribution(name: str) -> str:
-    """Return the distribution that drives a device, with its version."""
-    declared = () if name in _BACKENDS else entry_points(group=_GROUP, name=name)
-    of = next((each.dist for each in declared if each.dist), None)
-    return f"{of.name} {of.version}" if of else f"masrel {masrel.__version__}"
 
 
 def build_device(name: str, setup: DeviceSetup) -> Device:
