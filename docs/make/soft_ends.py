@@ -3,32 +3,21 @@
 ``python -m docs.make.soft_ends`` also prints the largest falls of a tick.
 """
 
-import math
+from math import radians
 
 import numpy as np
 
 from docs.make.benchmarks.figures import plain_figure
 from docs.make.evidence import FIGURES
-from masrel.lab.elbow import STANDARD_MODELS
-from masrel.lab.hess import (
-    Controller,
-    DeviceLimits,
-    SimulatedClock,
-    SimulatedHand,
-    StretchRules,
-    open_device,
-    run_presentation,
-)
+from masrel.lab.hess import DeviceLimits, StretchRules
 from masrel.lab.recording import Recording
-
-START = math.radians(30.0)
+from tests.lab.hess.rig import controls, present, stretching
 
 SCENES = {  # title: model, where to, deg, how often, longest, s; from when behind, s
     "HM4, arrives": ("HM4", 146.0, 1, 10.0, 1.1),
     "HM3, done in its catch": ("HM3", 146.0, 1, 0.8, 0.75),
     "HM3, brought back from its catch and stretched again": ("HM3", 100.0, 2, 3.9, 1.1),
 }
-SPEED = math.radians(92.0)
 RAMPS = {"at once": (0.0, "#D55E00", "--"), "soft": (0.1, "#0072B2", "-")}
 
 
@@ -36,22 +25,14 @@ def presented(
     model: str, end_deg: float, n_stretches: int, longest_s: float, ramp_s: float
 ) -> Recording:
     """One presentation on the simulated device, both ramps of one length."""
-    clock = SimulatedClock()
-    again = [SPEED] * (n_stretches - 1)
-    end = math.radians(end_deg)
-    hand = SimulatedHand(start=START, end=end, mean_speed=SPEED, again=again)
-    controller = Controller(
-        STANDARD_MODELS[model], start_angle=START, post_catch_ramp=ramp_s
-    )
-    with open_device("simulated", clock=clock, hand=hand) as device:
-        return run_presentation(
-            device,
-            controller,
-            clock=clock,
-            limits=DeviceLimits(end_ramp_time=ramp_s),
-            max_duration_s=longest_s,
-            stretches=StretchRules(n=n_stretches),
-        ).recording
+    again = [radians(92.0)] * (n_stretches - 1)
+    return present(
+        controls(model, post_catch_ramp=ramp_s),
+        hand=stretching(end=radians(end_deg), again=again),
+        limits=DeviceLimits(end_ramp_time=ramp_s),
+        max_duration_s=longest_s,
+        stretches=StretchRules(n=n_stretches),
+    ).recording
 
 
 def sent(recording: Recording) -> tuple[np.ndarray, np.ndarray]:

@@ -85,8 +85,7 @@ def _against_angle(axes: Axes, view: ToneView) -> None:
                 line.angle[mine], line.torque[mine], color=colour, linewidth=1.2,
                 linestyle=_BACK if name == "back" else "-",
             )  # fmt: skip
-    axes.set_xlabel("angle (deg)")
-    axes.set_ylabel("torque (N·m)")
+    axes.set(xlabel="angle (deg)", ylabel="torque (N·m)")
 
 
 def _against_time(torque: Axes, angle: Axes, view: ToneView) -> None:
@@ -110,8 +109,7 @@ def _against_time(torque: Axes, angle: Axes, view: ToneView) -> None:
             0.5 * (start + end), 1.03, name, transform=angle.get_xaxis_transform(),
             ha="center", va="bottom", fontsize=7.5, color=GREY,
         )  # fmt: skip
-    angle.set_xlabel("time (s)")
-    angle.set_ylabel("angle (deg)")
+    angle.set(xlabel="time (s)", ylabel="angle (deg)")
     torque.set_ylabel("torque (N·m)")
     angle.margins(x=0.01)
 

@@ -10,24 +10,15 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from masrel.lab.elbow import STANDARD_MODELS
-from masrel.lab.hess import (
-    Controller,
-    DeviceLimits,
-    SimulatedClock,
-    SimulatedHand,
-    open_device,
-    run_presentation,
-)
+from masrel.lab.hess import SimulatedHand
 from masrel.lab.hess._simulated import Plant, PlantParameters
+from tests.lab.hess.rig import START, present, stretching
 
-START, END = radians(30.0), radians(146.0)
 ARM = PlantParameters()
 INERTIA = ARM.friction.inertia + ARM.arm_inertia
 VISCOUS, COULOMB = ARM.friction.viscous, ARM.friction.coulomb
@@ -36,19 +27,10 @@ TICK = 0.001
 Values = NDArray[np.float64]
 
 
-def hand() -> SimulatedHand:
-    return SimulatedHand(start=START, end=END, mean_speed=radians(92.0))
-
-
 def commands() -> list[float]:
     """What was sent in each tick of one presentation, N·m."""
-    clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with open_device("simulated", clock=clock, hand=hand()) as device:
-        shown = run_presentation(
-            device, controller, clock=clock, limits=DeviceLimits()
-        ).recording
-    return [float(torque) for torque in shown.columns["command_torque_nm"]]
+    columns = present("HM3").recording.columns
+    return [float(torque) for torque in columns["command_torque_nm"]]
 
 
 def quantized(torque: float) -> float:
@@ -63,7 +45,7 @@ def felt(moved: SimulatedHand, time_s: float, angle: float, velocity: float) -> 
 def chosen(torques: list[float], step_ns: int) -> Values:
     """The plant of the package -> what the hand feels at each tick, N·m."""
     parameters = PlantParameters(step_ns=step_ns)
-    moved, plant = hand(), None
+    moved, plant = stretching(), None
     plant = Plant(moved, parameters)
     out = np.empty(len(torques))
     for tick, torque in enumerate(torques):
@@ -75,7 +57,7 @@ def chosen(torques: list[float], step_ns: int) -> Values:
 
 def semi_implicit_euler(torques: list[float], step: float) -> Values:
     """Speed first, then angle; the arm sticks where β can hold it."""
-    moved = hand()
+    moved = stretching()
     n = round(TICK / step)
     delay = round(ARM.delay / step)
     decay = math.exp(-step / ARM.lag_time)
@@ -158,7 +140,7 @@ class Arm:
 
 def by_solve_ivp(torques: list[float], method: str, rtol: float) -> Values:
     """scipy's solver between two changes of the command, with events."""
-    arm, state = Arm(hand()), np.array([START, 0.0, 0.0])
+    arm, state = Arm(stretching()), np.array([START, 0.0, 0.0])
     out = np.empty(len(torques))
     for tick, torque in enumerate(torques):
         now = tick * TICK

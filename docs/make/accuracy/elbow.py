@@ -2,8 +2,7 @@
 
 ``python -m docs.make.accuracy.elbow [--quiet]`` solves thousands of random scenes and
 the built corner cases twice, which takes some minutes, and writes
-``accuracy_joint.csv``
-and a part of ``accuracy.md``, in ``docs/evidence``.
+``accuracy_joint.csv`` and a part of ``accuracy.md``, in ``docs/evidence``.
 """
 
 import argparse

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from math import radians
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,24 +10,16 @@ from numpy.typing import NDArray
 from docs.make.benchmarks.figures import chart, plain_figure
 from docs.make.evidence import FIGURES
 from masrel.lab.elbow import STANDARD_MODELS
-from masrel.lab.hess import (
-    Controller,
-    DeviceLimits,
-    Friction,
-    SimulatedClock,
-    SimulatedHand,
-    open_device,
-    run_presentation,
-)
+from masrel.lab.hess import DeviceLimits, Friction
 from masrel.lab.recording import MEASURED_TORQUE, Recording
 from masrel.lab.report._material import FIGURES as MATERIAL
 from masrel.lab.report._trace_section import measured_panel
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import SIMULATED
+from tests.lab.hess.rig import present
 from tests.lab.hess.test_fit_of_recordings import NOTHING, measured, stretch, to_and_fro
 
-START, END = radians(30.0), radians(146.0)
 BACKDRIVE = to_and_fro(100.0 / 1.7)  # with a peak of 110 deg/s
 BLACK, GREY, BLUE, ORANGE, VERMILLION, GREEN = (
     "#000000",
@@ -100,20 +91,11 @@ def draw_simulated() -> None:
     draw_slip()
 
 
-def recorded(model: str, speed_deg_s: float, **options) -> Recording:
-    """One presentation on the simulated device."""
-    clock = SimulatedClock()
-    speed = radians(speed_deg_s)
-    hand = SimulatedHand(start=START, end=END, mean_speed=speed, **options)
-    controller = Controller(STANDARD_MODELS[model], start_angle=START)
-    with open_device("simulated", clock=clock, hand=hand) as device:
-        return run_presentation(
-            device,
-            controller,
-            clock=clock,
-            limits=DeviceLimits(torque=28.0),
-            max_duration_s=3.0,
-        ).recording
+def recorded(model: str, slip_time: float | None = None) -> Recording:
+    """One presentation on the simulated device, at 92 deg/s."""
+    limits = DeviceLimits(torque=28.0)
+    options = {"limits": limits, "max_duration_s": 3.0, "slip_time": slip_time}
+    return present(model, **options).recording
 
 
 @contextmanager
@@ -134,7 +116,7 @@ def draw_traces() -> None:
     title, ratios = "HM1 to HM4 at 92 deg/s, simulated device", (2.2, 1.0)
     with two_panels("driver_traces", title, height_ratios=ratios) as (upper, lower):
         for model, line in LINES.items():
-            columns = recorded(model, 92.0).columns
+            columns = recorded(model).columns
             time, look = columns["time_s"], {"color": COLOURS[model], "lw": 1.3}
             upper.plot(time, columns["model_torque_nm"], line, label=model, **look)
             lower.plot(time, columns["angle_deg"], line, **look)
@@ -171,18 +153,19 @@ def draw_backdrive() -> None:
         over_time.plot(time, torque, color=colour, linewidth=width)
         over_time.text(*label, color=colour, fontsize=8.5)
         over_speed.plot(speed, torque, color=colour, linewidth=0.7)
-    for axes in (over_time, over_speed):
+    for axes, letter in ((over_time, "a"), (over_speed, "b")):
         for level in (-0.5, -0.2, 0.2, 0.5):
             axes.axhline(level, color=GREY, linewidth=0.7, linestyle=":")
         axes.axhline(0.0, color=BLACK, linewidth=0.6)
-    _draw_law(over_speed)
-    over_time.set_xlabel("time (s)")
-    over_time.set_ylabel("measured torque (N·m)")
-    over_time.set_yticks([-0.5, -0.2, 0.0, 0.2, 0.5])
-    over_speed.set_xlabel("speed (deg/s)")
-    for axes, letter in ((over_time, "a"), (over_speed, "b")):
         axes.set_title(letter, loc="left", weight="bold", fontsize=10)
-    over_time.set_xlim(0.0, 3.4)
+    _draw_law(over_speed)
+    over_time.set(
+        xlabel="time (s)",
+        ylabel="measured torque (N·m)",
+        yticks=[-0.5, -0.2, 0.0, 0.2, 0.5],
+        xlim=(0.0, 3.4),
+    )
+    over_speed.set_xlabel("speed (deg/s)")
     figure.suptitle("SIMULATED DATA", x=0.995, ha="right", fontsize=8, color=VERMILLION)
     figure.savefig(FIGURES / "driver_backdrive.png")
 
@@ -199,10 +182,10 @@ def _draw_law(axes: Axes) -> None:
 
 def draw_slip() -> None:
     """Draw how a lost grip in the catch of HM4 goes."""
-    held = recorded("HM4", 92.0).columns
+    held = recorded("HM4").columns
     caught = held["time_s"][np.flatnonzero(held["phase"] == 1)[0]]
     slip_s = float(caught) + 0.03
-    slipped = recorded("HM4", 92.0, slip_time=slip_s).columns
+    slipped = recorded("HM4", slip_s).columns
     title = "HM4 at 92 deg/s, grip lost in the catch, simulated"
     with two_panels("driver_slip", title) as (upper, lower):
         for columns, line, colour, label in (

@@ -36,8 +36,7 @@ def chart(
     figure = plain_figure(5.6, height)
     axes = figure.add_subplot()
     yield axes
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    axes.set(xlabel=x, ylabel=y)
     axes.legend(frameon=False, **legend)
     figure.savefig(FIGURES / f"{name}.png")
 

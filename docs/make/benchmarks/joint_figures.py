@@ -46,8 +46,10 @@ def draw_work(lines: Sequence[Result]) -> None:
                         textcoords="offset points", color=colour, ha=side,
                         fontsize=6.5,
                     )  # fmt: skip
-        axes.set_xlabel("processor time of one stretch (ms)")
-        axes.set_ylabel("largest error of catch\nand catch end (s)")
+        axes.set(
+            xlabel="processor time of one stretch (ms)",
+            ylabel="largest error of catch\nand catch end (s)",
+        )
         axes.grid(which="major")
         axes.set_xlim(right=axes.get_xlim()[1] * 4)
         axes.legend(fontsize=7.5, loc="lower right")
@@ -69,10 +71,8 @@ def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
             for row in rows:
                 axes.plot(rates, 1e3 * row, ".", color=BLUE, markersize=2.5)
             axes.axvline(1000.0, color=BLACK, lw=0.7, linestyle=DASHES)
-            axes.set_title(name)
-            axes.set_xscale("log")
+            axes.set(title=name, xscale="log", xlabel="samples a second (Hz)")
             axes.set_yscale("symlog", linthresh=0.01)
-            axes.set_xlabel("samples a second (Hz)")
             axes.legend(fontsize=7.5, loc="upper right")
         panels[0].set_ylabel("sampled − exact (ms)")
         picture = finished(figure, stamp="", forms=["png"])["png"]
