@@ -6,7 +6,6 @@ R's psych, vcd and lme4 (`peers.R`, if R is installed), value by value. A differ
 that nothing here explains ends the program; an explanation of nothing is left out.
 """
 
-import contextlib
 import itertools
 import json
 import math
@@ -16,7 +15,6 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -27,6 +25,7 @@ import pandas as pd
 import masrel
 from docs.make.evidence import EVIDENCE, table, write_rows
 from masrel.agreement import COEFFICIENTS
+from tests.benchmarks.peers import present
 
 DOCS = Path(__file__).parents[1]
 PAGE, ROWS = EVIDENCE / "peers.md", EVIDENCE / "peers.csv"
@@ -34,6 +33,7 @@ HEAD = ("file", "ratings", "numbers compared", "equal")
 ORACLES = DOCS.parent / "tests" / "oracles" / "agreement.json"
 R_PROGRAM = Path(__file__).with_suffix(".R")
 QUANTITIES = {"value": "", "error": ", SE", "low": ", low", "high": ", high"}
+COLUMNS = ("value", "standard_error", "low", "high")  # of a table
 SHOWN = 12  # rows of a file that the page shows
 CLOSE = 1e-9  # of what is the same but for the last digits of floats
 # what programs are held to that iterate, or round
@@ -220,11 +220,11 @@ def files() -> list[File]:
 
 def ours(file: File, path: Path) -> dict[Question, Values]:
     """Return what masrel makes of a file."""
+    has_gaps = any("" in row for row in file.rows)
     values = {}
     for question in file.questions:
         of_icc = question.coefficient.startswith("icc")
         of_both = question.coefficient in ("icc_a1", "icc_ak")
-        has_gaps = any("" in row for row in file.rows)
         kind = "auto" if of_icc and (has_gaps or not of_both) else "analytic"
         target = "both" if of_both else "items"
         values[question] = agreed(file, path, question, target=target, interval=kind)
@@ -240,12 +240,7 @@ def agreed(file: File, path: Path, question: Question, **options: Any) -> Values
         reading=masrel.Reading(categories=file.categories or None),
         estimating=masrel.Estimating(**options),
     ).table.iloc[0]
-    return {
-        "value": row["value"],
-        "error": row["standard_error"],
-        "low": row["low"],
-        "high": row["high"],
-    }
+    return dict(zip(QUANTITIES, row[[*COLUMNS]], strict=True))
 
 
 def irrcac(file: File, question: Question) -> Values:
@@ -566,53 +561,55 @@ class Comparison:
 
 def compared(
     file: File, path: Path, theirs: list[tuple[str, Question, Values]]
-) -> list[Comparison]:
-    """Return every number of other programs beside ours, or say what is unexplained."""
-    mine, comparisons = ours(file, path), []
-    for (program, question, values), quantity in itertools.product(theirs, QUANTITIES):
-        if quantity not in values:
-            continue
-        own, other = mine[question][quantity], values[quantity]
-        why = None
-        if not is_same(program, quantity, own, other):
-            about = (file.name, question, quantity, program)
-            why = next((d for d in DIFFERENCES if d.explains(*about)), None)
-            if why is None:
-                raise SystemExit(f"{about}: {other} for {own}, which nothing explains")
-            if why.convention:
-                old = agreed(file, path, question, convention=why.convention)
-                if not is_same(program, quantity, old[quantity], other):
-                    raise SystemExit(f"{about}: {old[quantity]} by {why.convention}")
-        comparisons.append(
-            Comparison(
-                file=file.name,
-                question=question,
-                quantity=quantity,
-                program=program,
-                own=own,
-                other=other,
-                why=why,
-            )
-        )
-    quantities = list(QUANTITIES)
-    comparisons.sort(
-        key=lambda of: (
-            file.questions.index(of.question),
-            quantities.index(of.quantity),
-        )
-    )
-    return comparisons
+) -> Iterator[Comparison]:
+    """Yield every number of other programs beside ours, in the order of the page."""
+    mine = ours(file, path)
+    for question, quantity in itertools.product(file.questions, QUANTITIES):
+        for program, of, values in theirs:
+            if of == question and quantity in values:
+                own, other = mine[question][quantity], values[quantity]
+                is_alike = is_same(program, quantity, own, other)
+                yield Comparison(
+                    file=file.name,
+                    question=question,
+                    quantity=quantity,
+                    program=program,
+                    own=own,
+                    other=other,
+                    why=None
+                    if is_alike
+                    else reason(file, path, question, quantity, program, other),
+                )
+
+
+def reason(
+    file: File,
+    path: Path,
+    question: Question,
+    quantity: str,
+    program: str,
+    other: float | str,
+) -> Difference:
+    """Return why a number is another; if nothing explains it, that is the end."""
+    about = (file.name, question, quantity, program)
+    why = next((of for of in DIFFERENCES if of.explains(*about)), None)
+    if why is None:
+        raise SystemExit(f"{about}: {other}, which nothing explains")
+    if why.convention:
+        old = agreed(file, path, question, convention=why.convention)[quantity]
+        if not is_same(program, quantity, old, other):
+            raise SystemExit(f"{about}: {other}, but {old} by {why.convention}")
+    return why
 
 
 def rows_of(
     comparisons: list[Comparison], whys: list[Difference]
 ) -> Iterator[dict[str, str]]:
     """Yield the rows of a file; explanations are numbered as they are met."""
-    rows: dict[tuple[Question, str], list[Comparison]] = {}
-    for of in comparisons:
-        rows.setdefault((of.question, of.quantity), []).append(of)
-    for (question, quantity), row in rows.items():
-        others = []
+    for (question, quantity), group in itertools.groupby(
+        comparisons, key=lambda of: (of.question, of.quantity)
+    ):
+        row, others = list(group), []
         for of in row:
             if of.why is not None:
                 whys += [of.why] * (of.why not in whys)
@@ -674,27 +671,18 @@ def closing(whys: list[Difference]) -> list[str]:
     ]
 
 
-def installed() -> dict[str, str]:
-    """Return the versions of the programs in Python that are there."""
-    versions = {}
-    for name in PROGRAMS:
-        with contextlib.suppress(PackageNotFoundError):
-            versions[name] = version(name)
-    return versions
-
-
 def main() -> None:
     """Run all programs, and write the page."""
     lines, shown, rows = list[tuple[object, ...]](), list[str](), list[dict[str, str]]()
     whys, every = list[Difference](), list[Comparison]()
-    versions, has_r = installed(), shutil.which("Rscript") is not None
+    versions, has_r = present(list(PROGRAMS)), shutil.which("Rscript") is not None
     with tempfile.TemporaryDirectory() as folder:
         for file in files():
             path = Path(folder) / file.name
             path.write_text(file.csv, encoding="utf-8")
             theirs = list(by_python(file, versions))
             theirs += by_r(file, Path(folder), versions) if has_r else []
-            comparisons = compared(file, path, theirs)
+            comparisons = list(compared(file, path, theirs))
             every += comparisons
             rows += rows_of(comparisons, whys)
             n_equal = sum(of.why is None for of in comparisons)
