@@ -54,8 +54,6 @@ def _panel(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
         look = {"c": colour, "marker": marker, "lw": 0.0, "zorder": above}
         axes.scatter(covers["min"], y, 12, label=name, **look)
     axes.set_yticks(range(len(cells)), cells)
-    axes.set_ylim(len(cells) - 0.4, -0.6)
-    axes.set_xlim(_LEAST - 0.5, 100.5)
+    axes.set(ylim=(len(cells) - 0.4, -0.6), xlim=(_LEAST - 0.5, 100.5), axisbelow=True)
     axes.tick_params(axis="y", length=0)
-    axes.set_axisbelow(True)
     axes.spines[["top", "right", "left"]].set_visible(False)

@@ -143,20 +143,22 @@ def _asked(
     weights = weights or "identity"
     truth = population.truth(name, weights)
     scale = tuple(range(population.chances.shape[-1]))
-    known: dict[bytes, list[Answer]] = {}
+
+    @cache  # equal studies are computed once
+    def answers(text: bytes) -> list[Answer]:
+        codes = np.frombuffer(text, np.int8).reshape(n_items, -1)
+        ratings = CodedRatings(codes=codes, categories=scale)
+        is_defined = np.isfinite(COEFFICIENTS[name](ratings, weights=weights).value)
+        return [
+            _answer(of, truth, partial(method, name, ratings, weights))
+            for of, method in methods.items()
+            if is_defined
+        ]
+
     for _ in range(n_studies):
         codes = population.draw(n_items, rng)
-        # the order of items says nothing, and equal studies are computed once
-        codes = codes[np.lexsort(codes.T[::-1])]
-        if (key := codes.tobytes()) not in known:
-            ratings = CodedRatings(codes=codes, categories=scale)
-            is_defined = np.isfinite(COEFFICIENTS[name](ratings, weights=weights).value)
-            known[key] = [
-                _answer(of, truth, partial(method, name, ratings, weights))
-                for of, method in methods.items()
-                if is_defined
-            ]
-        yield from known[key]
+        # the order of items says nothing
+        yield from answers(codes[np.lexsort(codes.T[::-1])].tobytes())
 
 
 def _answer(name: str, truth: float, ask: Callable[[], Interval | None]) -> Answer:

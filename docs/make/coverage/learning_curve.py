@@ -1,7 +1,7 @@
 """How often the interval of one point of a learning curve holds the trainee's kappa."""
 
 from collections.abc import Iterator
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -9,6 +9,7 @@ import pandas as pd
 from docs.make.coverage.study import Answer, Cell, answer, crossed, percent
 from docs.make.evidence import EVIDENCE, write_part
 from docs.make.training import GRADES, criterion, drawn_with
+from masrel.estimates import Interval
 from masrel.intervals import estimate
 
 SEED, N_STUDIES = 2012, 1_000
@@ -32,16 +33,17 @@ def trainees(
 ) -> Iterator[Answer]:
     """Draw trainees who give only grades that models have; yield their intervals."""
     rule = criterion()
+
+    @cache  # equal trainings are computed once
+    def interval(pairs: tuple[tuple[str, str], ...]) -> Interval | None:
+        asked = {"target": "items", "categories": GRADES, "weights": rule.weights}
+        return estimate("cohen_kappa", pairs, **asked).interval
+
     for size in (8, 16):
         drawn = drawn_with(rule, kappa, n_studies, size, rng)["range"]
-        known: dict[tuple[tuple[str, str], ...], Answer] = {}
-        for one, other in zip(*drawn[:2], strict=True):
-            pairs = [(GRADES[i], GRADES[j]) for i, j in zip(one, other, strict=True)]
-            if (key := tuple(sorted(pairs))) not in known:
-                asked = {"target": "items", "categories": GRADES}
-                found = estimate("cohen_kappa", key, weights=rule.weights, **asked)
-                known[key] = answer(f"{size} presentations", found.interval, kappa)
-            yield known[key]
+        for training in np.array(GRADES)[np.stack(drawn[:2], axis=-1)].tolist():
+            pairs = tuple(sorted(map(tuple, training)))
+            yield answer(f"{size} presentations", interval(pairs), kappa)
 
 
 def write_page(rows: pd.DataFrame) -> None:
