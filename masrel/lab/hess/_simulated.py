@@ -174,6 +174,8 @@ class Plant:
         self._holds = hand.slip_time > 0.0
         self._propagators: dict[tuple[bool, int, int], Propagator] = {}
         self._force = self._force_at(0.0)
+        # Before the loop: numpy's first product of matrices takes memory for 0.1 s
+        self._propagator(self.step_ns * 1e-9, 0)
 
     def begin(self, now_ns: int) -> None:
         """Let the time of the hand begin now."""
