@@ -71,6 +71,7 @@ _MAX_ERROR_FRAMES = 10  # on a bus of one joint there should be none
 
 _PATIENCE_S = 0.1  # to let go; also what a bus needs that restarts itself after bus off
 _PAUSE_S = 0.001  # between two attempts
+_LEAST_ATTEMPTS = 3
 
 
 class Frame(NamedTuple):
@@ -399,10 +400,14 @@ class Node(ABC):
 
     def insist(self, attempt: Callable[[float], bool], advice: str) -> None:
         """Try to let go, again and again, until it is confirmed."""
-        # The attempt is told for how long it has failed, s
+        # The attempt is told for how long it has failed, s. A host that was away for
+        # longer than its patience still has some left.
         start_ns = self.clock.now_ns()
         reason = "it does not go to idle"
-        while (since_s := (self.clock.now_ns() - start_ns) * 1e-9) < _PATIENCE_S:
+        for n in itertools.count():
+            since_s = (self.clock.now_ns() - start_ns) * 1e-9
+            if n >= _LEAST_ATTEMPTS and since_s >= _PATIENCE_S:
+                break
             try:
                 if attempt(since_s):
                     return
