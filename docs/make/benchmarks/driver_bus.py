@@ -2,7 +2,8 @@
 
 ``python -m docs.make.benchmarks.driver_bus [N]`` prints the table of N presentations
 on either, in turn, that docs/evidence/driver.md has. The emulated moteus asks for
-SCHED_FIFO on the first processor; the loop has the last one.
+SCHED_FIFO on the first processor; the loop has the last one. Where the machine does
+other things, too, ``chrt -f 50`` before it keeps bring-up and letting go prompt.
 """
 
 import os
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.make.benchmarks.driver import END, START, LateClock
-from masrel.errors import OverrunWarning
+from masrel.errors import DeviceError, OverrunWarning
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     Controller,
@@ -103,6 +104,8 @@ def on_moteus(run: Run, number: int) -> None:
             if other.stdout is None or other.stdout.readline() != "ready\n":
                 raise SystemExit("the emulated moteus did not start")
             present(run, number, "moteus", options=options)
+        except DeviceError as error:
+            run.faults.append(f"moteus {number}: {error}")
         finally:
             other.kill()
 
