@@ -10,8 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from masrel.errors import DeviceError, OverrunWarning
+from masrel.errors import (
+    DeviceError,
+    IdledError,
+    LimitExceededError,
+    OverrunWarning,
+)
 from masrel.lab.hess import SimulatedClock
+from masrel.lab.hess._emulated import FaultKind
 from masrel.lab.hess.puck import InjectedFault, steady_runs
 from tests.lab.hess.moteus.rig import opened, presented
 from tests.lab.hess.rig import ActingClock, missing
@@ -104,12 +110,16 @@ def outcome(injected: InjectedFault) -> tuple[str | None, list[float], str]:
     return done.fault.kind, [noticed_ms, abs(before[-1]), peak, zero_ms], str(done)
 
 
+def tier(name: str) -> list[pytest.MarkDecorator]:
+    """Presentations with another code come to the same; each is named below."""
+    if name in QUICK:
+        return []
+    return [pytest.mark.long if name.startswith("code ") else pytest.mark.slow]
+
+
 @pytest.mark.parametrize(
     ("name", "injected", "kind"),
-    [
-        pytest.param(*row, marks=[] if row[0] in QUICK else pytest.mark.slow)
-        for row in FAULTS
-    ],
+    [pytest.param(*row, marks=tier(row[0])) for row in FAULTS],
 )
 def test_a_fault_is_named_and_leaves_no_torque(
     name: str, injected: InjectedFault, kind: str | None
@@ -127,6 +137,29 @@ def test_a_fault_is_named_and_leaves_no_torque(
     assert ("SWITCH ITS SUPPLY OFF" in words) == (name in NO_WORD)
     if name in OUT_OF_REACH:  # its own watchdog has let go
         assert zero_ms <= WATCHDOG_MS + 1.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "named"),
+    [
+        *(("board-fault", code, name) for code, name in CODES.items()),
+        *(("limited", code, "limited") for code in range(96, 104)),
+    ],
+)
+def test_each_code_has_its_name(kind: FaultKind, code: int, named: str) -> None:
+    clock = SimulatedClock()
+
+    def ten_ticks() -> None:
+        for _ in range(10):
+            device.command(0.0)
+            clock.sleep_until_ns(clock.now_ns() + 1_000_000)
+            device.read()
+
+    with opened(fault(kind, 0.002, size=code), clock=clock) as device:
+        faults = (IdledError, LimitExceededError)
+        with pytest.raises(faults, match=f"code {code}") as caught:
+            ten_ticks()
+    assert caught.value.kind == named
 
 
 def test_a_host_that_was_away_under_torque_does_not_just_go_on() -> None:
