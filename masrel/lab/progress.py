@@ -228,7 +228,7 @@ class RaterProgress:
         has left, or is left out of the analysis.
     is_late : bool
         Whether the rater joined after the site's first draw of schedules;
-        ``docs/howto/laboratory/conduct.md`` says how that is known.
+        ``docs/reference/formats/conduct_log.md`` says how that is known.
     values : mapping of str to (str, int, float or None)
         What every field of the protocol holds; None where nothing is known.
     """

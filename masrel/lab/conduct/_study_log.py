@@ -116,7 +116,7 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
     Returns
     -------
     tuple of Event
-        In order of time, with the fields that ``docs/howto/laboratory/conduct.md``
+        In order of time, with the fields that ``docs/reference/formats/conduct_log.md``
         lists; None stands for all, or for nothing. Empty when nothing happened.
 
     Raises

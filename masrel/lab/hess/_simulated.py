@@ -348,7 +348,7 @@ class TorqueSensor:
     """The torque sensor of the simulated device, between motor and arm.
 
     It reads what the arm pulls at: the motor's torque, friction and what moves the
-    motor itself. The numbers are of no product; ``docs/explanation/driver.md`` gives
+    motor itself. The numbers are of no product; ``docs/reference/driver.md`` gives
     reasons.
 
     Attributes

@@ -27,6 +27,7 @@ _LOOSE_SHARE = 0.6
 # Behind the guard a beat of clonus throws light hands back as well, and a hand may turn
 # the arm by itself, at up to 30 rad/s²: more counts, of what 2.8 N·m take in 6 ms.
 _GUARDED_SHARE = 0.78
+_MOST_GIVEN_UP = 0.25  # of a guarded model's torque in one tick, N·m
 _GUARDED_WINDOW_S = 0.006
 _LEAST_LOSS = math.radians(16.0)
 _RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
@@ -159,7 +160,8 @@ class Controller:
 
     Where a catch or post-catch ends otherwise, the torque goes from where it stands to
     that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
-    meanwhile ends this at once.
+    meanwhile ends this at once. Where a guarded model gives up more than 0.25 N·m in
+    one tick, as clonus does, it goes as soon as no tick takes more than that.
 
     A model that is not passive is guarded: in every phase it is a fault when the arm
     gets within 6 ms more than 0.78 of the speed that the torque would give it if nobody
@@ -192,7 +194,7 @@ class Controller:
         soft hand for a lost grip, too small a one notices a lost grip late.
     post_catch_ramp : float, optional
         How long the end of a catch or post-catch takes, s, 0 to 1; 0 is the step of
-        Fig. 7. A guarded model has its own law there.
+        Fig. 7. Of a guarded model only whether there is a ramp.
     rate_hz : int, optional
         Steps a second.
 
@@ -349,7 +351,7 @@ class Controller:
         command = torque - self._compensation.torque(velocity)
         phase = joint.phase
         if self.phase != phase:
-            self._enter(phase, time_s)
+            self._enter(phase, time_s, command)
         if self.is_easing:
             command = self._eased(command)
         self._command = command
@@ -376,7 +378,7 @@ class Controller:
             )
         return torque
 
-    def _enter(self, phase: int, time_s: float) -> None:
+    def _enter(self, phase: int, time_s: float, command: float) -> None:
         if self.phase == _PRE_CATCH and not self.is_guarded:
             self._may_catch = False
             self._late_torque, self._taken = self._command, 0.0
@@ -384,13 +386,23 @@ class Controller:
             self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
             self._max_restored = -_INFINITE
         ends = self.phase != _PRE_CATCH and phase == _PRE_CATCH
-        if ends and self._post_catch_ramp and not self.is_guarded:
-            self._easing = iter(self._post_catch_ramp)
+        if ends and (shares := self._shares_left(command)):
+            self._easing = iter(shares)
             self._stood = self._command
-            n_ticks = len(self._post_catch_ramp)
-            self._steepest_fall = 0.5 * math.pi * abs(self._stood) / n_ticks
+            self._steepest_fall = 0.5 * math.pi * abs(self._stood) / len(shares)
             self.is_easing = True
         self.phase = phase
+
+    def _shares_left(self, command: float) -> tuple[float, ...]:
+        # Of the torque that stands, in each tick from now on
+        ramp, stands = self._post_catch_ramp, self._command
+        if not (self.is_guarded and ramp):
+            return ramp
+        if abs(stands - command) <= _MOST_GIVEN_UP:
+            return ()
+        # A ramp of 100 ms hides a lost grip, so this is the shortest
+        n_ticks = 0.5 * math.pi * abs(stands) / _MOST_GIVEN_UP
+        return raised_cosine(n_ticks / self.rate_hz, self.rate_hz)
 
     def _eased(self, command: float) -> float:
         # Between the torque that stood at the end and what the law asks for now

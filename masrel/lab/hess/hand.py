@@ -22,7 +22,7 @@ _MOST_CORRECTION = 15.0
 
 
 # The least and the largest value of what people's hands differ in, each uniform in its
-# logarithm and independent of the others; docs/explanation/driver.md has the sources.
+# logarithm and independent of the others; docs/reference/driver.md has the sources.
 _PEOPLE = {
     "stiffness": (10.0, 600.0),  # N·m/rad
     "damping_time": (0.03, 0.08),  # damping over stiffness, s
@@ -350,7 +350,7 @@ class HandTraits:
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        """Draw the hand of one person; ``docs/explanation/driver.md`` has the ranges.
+        """Draw the hand of one person; ``docs/reference/driver.md`` has the ranges.
 
         Parameters
         ----------

@@ -59,7 +59,7 @@ def _check_not_negative(**values: float) -> None:
 class DeviceLimits:
     """What the loop lets pass, in SI units.
 
-    ``docs/explanation/driver.md`` gives the reasons.
+    ``docs/reference/driver.md`` gives the reasons.
 
     Attributes
     ----------

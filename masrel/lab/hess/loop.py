@@ -381,7 +381,8 @@ class _Ticks:
             # One share a tick, however late it comes: no fall is steeper than this
             torque = self._last_torques.pop()
         if self._active_guard is not None:
-            acting = torque if self._is_ending else controller.model_torque
+            is_on_the_way = self._is_ending or controller.is_easing
+            acting = torque if is_on_the_way else controller.model_torque
             self._active_guard.check(angle, velocity, acting)
         guard.torque(time_s, torque)
         self._device.command(torque)

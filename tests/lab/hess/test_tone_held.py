@@ -241,7 +241,7 @@ def test_a_kind_is_stretched_held_and_brought_back(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_kind_begins_from_nothing(kind: str) -> None:
+def test_a_kind_begins_from_nothing_and_gives_up_softly(kind: str) -> None:
     traits = HandTraits.sample(np.random.default_rng(1001))
     hand = HumanHand(
         traits,
@@ -256,6 +256,9 @@ def test_a_kind_begins_from_nothing(kind: str) -> None:
     torque = presented.recording.columns["command_torque_nm"]
     assert torque[0] == 0.0
     assert abs(np.diff(torque[:101])).max() <= 0.25
+    if kind.startswith("clonus"):
+        assert presented.fault is None
+        assert np.diff(torque).min() >= -0.25
 
 
 def test_clonus_beats_as_long_as_even_a_soft_hand_holds_it() -> None:
