@@ -7,17 +7,15 @@ python -m docs.make.identification right [STUDIES [CASE...]]
 python -m docs.make.identification time
 """
 
-import csv
 import math
 import statistics
 import sys
 import time
 from collections import Counter
-from contextlib import nullcontext
-from pathlib import Path
 
 from tqdm import tqdm
 
+from docs.make.evidence import FIGURES, table, write_rows
 from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.lab.elbow._model_file import QUANTITIES
 from masrel.lab.report._fits import fit_figures
@@ -32,8 +30,6 @@ from tests.lab.elbow.identification.test_lack_of_fit import (
     recordings,
 )
 
-FIGURES = Path(__file__).parents[1] / "figures"
-TERMS_TABLE = Path(__file__).parents[1] / "evidence" / "identification_terms.csv"
 HALF = Scatter(
     catch_angle=math.radians(1.0), catch_torque=0.05, catch_travel=math.radians(1.0)
 )
@@ -74,24 +70,24 @@ def wrong(n_studies: int, *names: str) -> None:
 
     Of some of it alone, print that.
     """
-    head = ["term", "catches", "fitted", "announced", *SYMBOLS]
-    place = (
-        TERMS_TABLE.open("w", encoding="utf-8", newline="")
-        if not names
-        else nullcontext(sys.stdout)
-    )
-    with place as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(head)
-        for scatter in (None, SCATTER):
-            for name in tqdm(names or WRONG):
-                case = {"arm": WRONG[name], "scatter": scatter}
-                for options in ({}, {TERMS[name]: "fitted"}):
-                    total = counts(case, range(5000, 5000 + n_studies), **options)
-                    kind = "scattered" if scatter else "exact"
-                    is_fitted = "yes" if options else "no"
-                    row = [name, kind, is_fitted, total["does not fit"]]
-                    table.writerow([*row, *(total[parameter] for parameter in NAMES)])
+    rows = []
+    for scatter in (None, SCATTER):
+        for name in tqdm(names or WRONG):
+            case = {"arm": WRONG[name], "scatter": scatter}
+            for options in ({}, {TERMS[name]: "fitted"}):
+                total = counts(case, range(5000, 5000 + n_studies), **options)
+                row = {
+                    "term": name,
+                    "catches": "scattered" if scatter else "exact",
+                    "fitted": "yes" if options else "no",
+                    "announced": total["does not fit"],
+                }
+                of = (total[parameter] for parameter in NAMES)
+                rows.append(row | dict(zip(SYMBOLS, of, strict=True)))
+    if names:
+        print(table(list(rows[0]), [list(row.values()) for row in rows], n_text=3))
+    else:
+        write_rows("identification_terms", rows)
 
 
 def right(n_studies: int, *cases: str) -> None:

@@ -1,7 +1,6 @@
 """How often tests of a judge reject what is true, and what is not.
 
-``python -m docs.make.judge_levels`` writes ``docs/evidence/judges_levels.csv`` and
-``docs/figures/judges_levels.png``.
+``python -m docs.make.judge_levels`` writes ``docs/evidence/judges_levels.csv``.
 """
 
 from bisect import bisect_right
@@ -11,12 +10,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from docs.make.evidence import FIGURES, write_rows
+from docs.make.evidence import write_rows
 from masrel.agreement import benjamini_yekutieli
 from masrel.judges import PairedTest
 from masrel.judges._paired import (
@@ -26,7 +23,6 @@ from masrel.judges._paired import (
     region_share,
     rejected,
 )
-from masrel.plots._style import BLUE, ORANGE, VERMILLION, finished, house_style
 
 Row = dict[str, Any]
 Floats = NDArray[np.float64]
@@ -35,8 +31,10 @@ Integers = NDArray[np.int64]
 COLUMNS = ("what", "n", "test", "bound", "epsilon", "of", "percent")
 
 TESTS: tuple[PairedTest, ...] = ("exact", "score", "t")
-SIZES = (20, 30, 50, 100, 200, 300, 1000, 2500, 3000)
-CURVE = (20, 25, 30, 40, 50, 60, 75, 100, 125, 150, 200, 250, 300)
+SIZES = (
+    *(20, 25, 30, 40, 50, 60, 75, 100, 125, 150, 200, 250, 300),
+    *(1000, 2500, 3000),
+)
 BOUNDS = {"0.05": 0.05, "0.00909": 0.05 / 5.5}  # the first of three humans
 EPSILONS = (0.1, 0.15, 0.2)
 SHARES = (0.1, 0.4)  # of items that differ, as many either way
@@ -139,45 +137,14 @@ def _row(*values: Any) -> Row:
     return dict(zip(COLUMNS, (*cell, round(100.0 * float(share), 2)), strict=True))
 
 
-def draw(rows: Sequence[Row]) -> None:
-    """Draw levels by the number of items, and how often a judge passes wrongly."""
-    every = (
-        pd.DataFrame(rows)
-        .query("bound == '0.05'")
-        .set_index(["what", "test", "n"])
-        .sort_index()
-    )
-    looks = zip(TESTS, ((BLUE, "-"), (ORANGE, "--"), (VERMILLION, ":")), strict=True)
-    with house_style():
-        figure = Figure(figsize=(7.2, 3.2))
-        left, right = figure.subplots(1, 2)
-        for test, (colour, style) in looks:
-            levels = (
-                every.loc["level", test]["percent"]
-                .groupby("n")
-                .max()
-                .loc[CURVE[0] : CURVE[-1]]
-            )
-            left.plot(levels.index, levels, style, color=colour, label=test)
-            passed = every.loc["passed", test].query("of == 3")["percent"]
-            right.plot(passed.index.map(str), passed, f"o{style}", color=colour)
-        left.axhline(5.0, color="0.5", linewidth=0.8)
-        left.set(xlabel="items", ylabel="true hypotheses rejected (%)", ylim=(0, None))
-        right.set(xlabel="items", ylabel="judges that pass wrongly (%)", ylim=(0, None))
-        left.legend()
-        picture = finished(figure, stamp="", forms=("png",))["png"]
-        (FIGURES / "judges_levels.png").write_bytes(picture)
-
-
 def main() -> None:
-    """Compute and draw; write rows and figure."""
+    """Compute and write the rows."""
     rows = [
-        *exact_rows(sorted({*SIZES, *CURVE})),
+        *exact_rows(SIZES),
         *family_rows(N_STUDIES),
         *cluster_rows(N_STUDIES),
     ]
     write_rows("judges_levels", rows)
-    draw(rows)
 
 
 if __name__ == "__main__":

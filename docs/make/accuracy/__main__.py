@@ -1,8 +1,8 @@
 """masrel and other packages beside exact fractions: how far is each number off?
 
 ``python -m docs.make.accuracy [--quiet]`` runs the cases of ``tests/accuracy``, which
-takes some minutes, and writes ``accuracy.csv``, a part of ``accuracy.md`` in
-``docs/evidence``, and the figure. Packages that are not installed are left out.
+takes some minutes, and writes ``accuracy.csv`` and a part of ``accuracy.md``, in
+``docs/evidence``. Packages that are not installed are left out.
 """
 
 import argparse
@@ -12,11 +12,10 @@ from collections.abc import Iterator
 from tqdm import tqdm
 
 import masrel
-from docs.make.accuracy.figure import draw
 from docs.make.accuracy.numbers import Number, compared
 from docs.make.accuracy.page import rows, summary
 from docs.make.accuracy.peers import PACKAGES
-from docs.make.evidence import EVIDENCE, FIGURES, write_part, write_rows
+from docs.make.evidence import EVIDENCE, write_part, write_rows
 from tests.accuracy.cases import CASES, METRICS, Case
 from tests.benchmarks.peers import present
 
@@ -43,7 +42,6 @@ def main() -> None:
     versions = {"masrel": masrel.__version__, **packages}
     versions |= present(["numpy", "scipy", "pandas", "mpmath"])
     versions["Python"] = platform.python_version()
-    draw(numbers, FIGURES / "accuracy.png")
     write_rows("accuracy", list(rows(numbers)))
     write_part(EVIDENCE / "accuracy.md", "numbers", summary(numbers, versions))
 

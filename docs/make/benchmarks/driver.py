@@ -16,7 +16,6 @@ from math import radians
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from docs.make.benchmarks import driver_figures
 from masrel.errors import OverrunWarning
@@ -206,7 +205,7 @@ def nothing(seconds: float) -> tuple[list[int], int]:
         return ordinary(seconds)
 
 
-def lateness(seconds: float) -> dict[str, NDArray[np.float64]]:
+def lateness(seconds: float) -> None:
     """Print how late ticks are, three loops in turn, segment by segment."""
     loops = {"control loop": loop, "nothing": nothing, "nothing, ordinary": ordinary}
     runs = side_by_side(
@@ -216,25 +215,20 @@ def lateness(seconds: float) -> dict[str, NDArray[np.float64]]:
     with real_time() as granted:
         print(f"granted: {granted}")
     print(f"{'lateness, µs':20}     p50     p99   p99.9     max   missed of")
-    late_us = {}
     for name, samples in runs.items():
-        late_us[name] = np.concatenate([of.result[0] for of in samples]) / 1e3
+        late_us = np.concatenate([of.result[0] for of in samples]) / 1e3
         n_missed = sum(of.result[1] for of in samples)
-        quantiles = np.percentile(late_us[name], [50, 99, 99.9, 100])
+        quantiles = np.percentile(late_us, [50, 99, 99.9, 100])
         cells = " ".join(f"{v:7.0f}" for v in quantiles)
-        print(f"{name:20} {cells} {n_missed:8} {late_us[name].size}")
-    return late_us
+        print(f"{name:20} {cells} {n_missed:8} {late_us.size}")
 
 
 def main() -> None:
     tick_costs()
-    late = lateness(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)
-    driver_figures.draw_lateness(late)
-    integrators = driver_integrators.measured()
-    for name, points in integrators.items():
+    lateness(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)
+    for name, points in driver_integrators.measured().items():
         for setting, seconds, error in points:
             print(f"{name:22} {setting:8.2g}  {seconds:9.5f} s/s  {error:.2e} N·m")
-    driver_figures.draw_integrators(integrators)
     driver_figures.draw_simulated()
 
 

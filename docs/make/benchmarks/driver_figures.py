@@ -1,13 +1,12 @@
 """The figures of docs/evidence/driver.md; everything in them is simulated."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from docs.make.benchmarks.figures import chart, plain_figure
+from docs.make.benchmarks.figures import plain_figure
 from docs.make.evidence import FIGURES
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import DeviceLimits, Friction
@@ -29,58 +28,11 @@ BLACK, GREY, BLUE, ORANGE, VERMILLION, GREEN = (
     "#D55E00",
     "#009E73",
 )
-STYLES = {
-    "exact step": (BLUE, "o", "-"),
-    "semi-implicit Euler": (VERMILLION, "s", "--"),
-    "solve_ivp RK45": (GREEN, "^", "-."),
-    "solve_ivp LSODA": (GREY, "D", ":"),
-}
 LINES = {"HM1": ":", "HM2": "-.", "HM3": "--", "HM4": "-"}
 COLOURS = {"HM1": GREEN, "HM2": ORANGE, "HM3": VERMILLION, "HM4": BLUE}
 
 
 GRID = {"color": "#DDDDDD", "linewidth": 0.6}
-
-
-def draw_integrators(integrators: Mapping[str, list[tuple[float, ...]]]) -> None:
-    """Draw the processor time of a simulated second against the largest error."""
-    legend = {"loc": "lower left", "fontsize": 8}
-    x = "processor time of a simulated second (s)"
-    y = "largest error of the hand's torque (N·m)"
-    with chart("driver_integrators", x=x, y=y, height=3.6, **legend) as axes:
-        for name, points in integrators.items():
-            _, seconds, errors = zip(*points, strict=True)
-            colour, marker, line = STYLES[name]
-            look = {"color": colour, "marker": marker, "linestyle": line}
-            axes.loglog(seconds, errors, markersize=5, label=name, **look)
-        (shipped,) = (of for of in integrators["exact step"] if of[0] == 0.0005)
-        axes.annotate(
-            "as shipped: 0.5 ms",
-            shipped[1:],
-            (7, 1),
-            textcoords="offset points",
-            color=BLUE,
-            ha="left",
-        )
-        quantum = 18.8 / 2700.0
-        axes.axhline(quantum, color=GREY, linewidth=0.8)
-        axes.text(0.05, quantum * 1.2, "torque quantum", color=GREY, ha="center")
-        axes.grid(**GRID)
-
-
-def draw_lateness(loops: Mapping[str, NDArray[np.float64]]) -> None:
-    """Draw the share of ticks that are later than a time."""
-    legend = {"loc": "lower left", "fontsize": 8}
-    x, y = "lateness (µs)", "share of ticks that are later"
-    with chart("driver_lateness", x=x, y=y, height=3.6, **legend) as axes:
-        styles = ((BLUE, "-"), (BLACK, "--"), (GREY, ":"))
-        for (name, late), (colour, line) in zip(loops.items(), styles, strict=True):
-            ordered = np.sort(np.maximum(late, 1.0))
-            share = 1.0 - np.arange(ordered.size) / ordered.size
-            axes.loglog(ordered, share, color=colour, linestyle=line, label=name)
-        axes.axvline(1000.0, color=GREY, linewidth=0.8)
-        axes.text(1060.0, 0.4, "a tick is missed", color=GREY, fontsize=8)
-        axes.grid(**GRID)
 
 
 def draw_simulated() -> None:

@@ -1,7 +1,6 @@
-"""Agreement coefficients beside other packages: time, memory, error."""
+"""Agreement coefficients beside other packages: time and memory."""
 
 from collections.abc import Iterator
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
@@ -23,7 +22,6 @@ from tests.benchmarks.peers import PEERS, Codes, made, present, sklearn_cohen
 SIZES = ((4, 8), (100, 5), (10_000, 5), (1_000_000, 5), (10_000_000, 3))
 THREE = (fleiss_kappa, gwet_ac, krippendorff_alpha)
 BY_SIZE = "three coefficients of"
-NEAR_CHANCE = "all items but five unanimous"
 TABLE_V = [
     ["1", "1", "1", "1+", "1", "1", "1", "1"],
     ["1+", "1+", "1+", "1+", "1+", "1", "1+", "1"],
@@ -49,7 +47,6 @@ def rows(quick: bool, _: Path) -> Iterator[Row]:
     """Yield all of them."""
     yield from by_size(quick)
     yield from other_ways_in(10_000 if quick else 1_000_000)
-    yield from near_chance(quick)
 
 
 def by_size(quick: bool) -> Iterator[Row]:
@@ -123,45 +120,8 @@ def other_ways_in(n: int) -> Iterator[Row]:
     )
 
 
-def near_chance(quick: bool) -> Iterator[Row]:
-    """Fleiss' kappa of ratings nearly all in one category, and how far it is off."""
-    rng = np.random.default_rng(4)
-    for n in (100, 1_000, 10_000, 100_000, 1_000_000)[: 3 if quick else None]:
-        codes: Codes = np.ones((n, 5), dtype=np.int64)
-        rare = rng.integers(0, n, 5)
-        codes[rare] = made(rng, 5, 5)
-        peers = present(["statsmodels", "irrCAC"])
-        yield Row(
-            what=f"Fleiss' κ of {n:,} × 5, {NEAR_CHANCE}",
-            n_ratings=5 * n,
-            works={
-                "masrel": lambda codes=codes: fleiss_kappa(codes).value,
-                **{name: partial(PEERS[name], codes) for name in peers},
-            },
-            turns=3,
-            value=partial(error, exact_fleiss(codes)),
-        )
-
-
-def error(exact: Fraction, found: float) -> float:
-    """Return how far a float is off."""
-    return float(abs(Fraction(found) - exact))
-
-
-def exact_fleiss(codes: Codes) -> Fraction:
-    """Fleiss' kappa in fractions, by the textbook formula."""
-    counts = np.stack([(codes == k).sum(axis=1) for k in range(1, 6)], axis=1)
-    n, r = codes.shape
-    agreeing = int((counts * (counts - 1)).sum())
-    observed = Fraction(agreeing, n * r * (r - 1))
-    chance = sum(
-        (Fraction(int(total), n * r) ** 2 for total in counts.sum(axis=0)), Fraction(0)
-    )
-    return (observed - chance) / (1 - chance)
-
-
 def draw(lines: list[Result]) -> None:
-    """Draw time against ratings, and the error of Fleiss' kappa against time."""
+    """Draw time against ratings."""
     sized = [line for line in lines if line["what"].startswith(BY_SIZE)]
     with chart("benchmark_time", x="ratings", y="time (s)") as axes:
         for name, of in series(sized, "program").items():
@@ -170,24 +130,6 @@ def draw(lines: list[Result]) -> None:
             seconds = [line["seconds"] for line in of]
             axes.loglog(ratings, seconds, label=label, **LOOKS[name])
         axes.grid(alpha=0.25)
-    off = [line for line in lines if NEAR_CHANCE in line["what"]]
-    x = "time (s); beside each point the number of items"
-    with chart("benchmark_error", x=x, y="absolute error of κ") as axes:
-        for name, of in series(off, "program").items():
-            seconds = [line["seconds"] for line in of]
-            errors = [max(line["error"], 1e-17) for line in of]
-            look = {**LOOKS[name], "ls": "", "alpha": 0.9}
-            axes.loglog(seconds, errors, label=name, **look)
-            for i, (line, *at) in enumerate(zip(of, seconds, errors, strict=True)):
-                axes.annotate(
-                    f"{line['ratings'] // 5:.0e}".replace("e+0", "e"),
-                    at,
-                    xytext=(0, -11 if i % 2 else 5),  # so that neighbours keep apart
-                    textcoords="offset points",
-                    ha="center",
-                    size=6,
-                )
-        axes.axhline(2**-54, color="0.6", lw=0.8, ls="--")
 
 
-BENCHMARK = Benchmark(rows=rows, value="error", draw=draw)
+BENCHMARK = Benchmark(rows=rows, draw=draw)

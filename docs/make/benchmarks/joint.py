@@ -1,18 +1,17 @@
-"""The joint model: one scene, thousands of scenes, and run time against error."""
+"""The joint model: one scene, thousands of scenes, and how late samples are."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from functools import partial
 from math import radians
 from pathlib import Path
 
 import numpy as np
-from mpmath import mp
+from matplotlib.figure import Figure
 
-from docs.make.benchmarks import joint_figures
-from docs.make.benchmarks.joint_ode import Ode
 from docs.make.benchmarks.joint_stepped import places, step_together
 from docs.make.benchmarks.rows import Benchmark, Result, Row
+from docs.make.evidence import FIGURES
 from masrel.lab.elbow import (
     STANDARD_MODELS,
     Columns,
@@ -25,14 +24,11 @@ from masrel.lab.elbow import (
     Trapezoid,
     evaluate,
     events,
-    peak_torque,
     trace,
 )
 from masrel.lab.elbow._scenes import EVENTS
-from tests.lab.elbow.reference import solved
+from masrel.plots._style import BLACK, BLUE, DASHES, finished, house_style
 
-RATES_HZ = (100.0, 1e3, 1e4, 1e5)
-TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 KINDS: dict[str, type] = {
     "constant": ConstantSpeed,
     "minimum jerk": MinimumJerk,
@@ -50,7 +46,6 @@ def rows(quick: bool, _: Path) -> Iterator[Row]:
     for kind in ("minimum jerk", "trapezoid"):
         yield many_scenes(f"{kind}, with inertia", kind, n, inertia=0.1)
     yield many_scenes("minimum jerk, slow", "minimum jerk", n, speeds="slow")
-    yield work_against_error()
 
 
 def one_scene() -> Iterator[Row]:
@@ -159,44 +154,13 @@ def step(joint: ElbowParameters, motion: Motion, rate_hz: float) -> tuple[float,
     return stepped.catch_time, max(torques)
 
 
-def work_against_error() -> Row:
-    """The largest error of catch and catch end over a few speeds, way by way."""
-    motions = [reach(speed) for speed in (73.0, 81.0, 92.0, 104.0, 117.0)]
-    with mp.workdps(50):
-        trues = [solved(HM3, motion).stretches[0] for motion in motions]
-    ways: dict[str, Way] = {"exact": exact}
-    ways |= {f"sampled, {rate:g} Hz": partial(sampled, rate) for rate in RATES_HZ}
-    ways |= {f"solve_ivp, rtol {t:g}": partial(integrated, t) for t in TOLERANCES}
-
-    def of_all(way: Way) -> list[tuple[float, float]]:
-        return [way(motion) for motion in motions]
-
-    def error(found: list[tuple[float, float]]) -> float:
-        return max(
-            float(max(abs(catch - true.catch), abs(end - true.catch_end)))
-            for (catch, end), true in zip(found, trues, strict=True)
-        )
-
-    return Row(
-        what="catch and catch end of a stretch",
-        works={name: partial(of_all, way) for name, way in ways.items()},
-        parts=dict.fromkeys(ways, len(motions)),
-        turns=11,
-        value=error,
-    )
-
-
 def reach(speed_deg_s: float) -> MinimumJerk:
     return MinimumJerk(
         start=radians(30.0), end=radians(146.0), mean_speed=radians(speed_deg_s)
     )
 
 
-Way = Callable[[Motion], tuple[float, float]]  # the catch and its end, s
-
-
 def exact(motion: Motion) -> tuple[float, float]:
-    peak_torque(HM3, motion)  # which no other way has
     found = events(HM3, motion)
     return found.catch, found.catch_end
 
@@ -205,11 +169,6 @@ def sampled(rate_hz: float, motion: Motion) -> tuple[float, float]:
     made = trace(HM3, motion, rate_hz=rate_hz)
     catch, end = (made.time[np.argmax(made.phase == code)] for code in (1, 2))
     return float(catch), float(end)
-
-
-def integrated(rtol: float, motion: Motion) -> tuple[float, float]:
-    found = Ode(HM3, motion, rtol=rtol).found
-    return found.get("catch", np.nan), found.get("catch_end", np.nan)
 
 
 def approach() -> tuple[list[float], dict[str, np.ndarray]]:
@@ -224,11 +183,27 @@ def approach() -> tuple[list[float], dict[str, np.ndarray]]:
     return rates, {"catch": late[0], "catch end": late[1]}
 
 
-def draw(lines: list[Result]) -> None:
-    """Draw errors against time, and how late samples are."""
-    of_error = [line for line in lines if line["error, s"] is not None]
-    joint_figures.draw_work(of_error)
-    joint_figures.draw_approach(*approach())
+def draw(_: list[Result]) -> None:
+    """Draw how late a sampled law sees the events, speed by speed, by the rate."""
+    rates, late = approach()
+    with house_style(parse_math=True):
+        figure = Figure(figsize=(6.2, 2.9))
+        panels = figure.subplots(1, 2, sharex=True, sharey=True)
+        periods = 1e3 / np.array(rates)
+        for axes, (name, rows), most in zip(panels, late.items(), (1, 2), strict=True):
+            axes.fill_between(
+                rates, 0.0, most * periods, color="#DDDDDD", lw=0,
+                label=f"0 to {most} period" + "s" * (most > 1),
+            )  # fmt: skip
+            for row in rows:
+                axes.plot(rates, 1e3 * row, ".", color=BLUE, markersize=2.5)
+            axes.axvline(1000.0, color=BLACK, lw=0.7, linestyle=DASHES)
+            axes.set(title=name, xscale="log", xlabel="samples a second (Hz)")
+            axes.set_yscale("symlog", linthresh=0.01)
+            axes.legend(fontsize=7.5, loc="upper right")
+        panels[0].set_ylabel("sampled − exact (ms)")
+        picture = finished(figure, stamp="", forms=["png"])["png"]
+        (FIGURES / "elbow_sampled.png").write_bytes(picture)
 
 
-BENCHMARK = Benchmark(rows=rows, value="error, s", draw=draw)
+BENCHMARK = Benchmark(rows=rows, draw=draw)

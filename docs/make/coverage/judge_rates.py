@@ -37,11 +37,6 @@ DESIGNS = [
         enumerate(LABELS), enumerate(JUDGED), enumerate(RATES)
     )
 ]
-GRADES = {"auto": "PPI++, jackknife: the default", "z": "PPI++, z"}
-COLUMNS = (
-    *("n_labels", "n_judged", "true", "judge", "method"),
-    *("n_answers", "n_held", "width"),
-)
 GRADES = {  # of 1 to 5: shares of each
     "as many of each": (0.2, 0.2, 0.2, 0.2, 0.2),
     "most are 5": (0.02, 0.03, 0.05, 0.2, 0.7),
