@@ -129,7 +129,7 @@ def test_two_sequences_are_the_raters_of_a_table(form: Callable[..., Any]) -> No
             pd.Series(LEE, index=range(1, 6)),
             "two Series with the same index",
         ),
-        ([], [], "at least one of each"),
+        ([], [], "at least one item and one rater"),
     ],
 )
 def test_what_may_be_something_else_is_refused(

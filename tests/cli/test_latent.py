@@ -79,7 +79,7 @@ def test_the_figure_shows_items_thresholds_and_raters(
         (WIDE.replace("1+", "x"), (), "--categories with every grade in order"),
         (SESSIONS, (), "has 2 sessions (first, second); choose one with --only"),
         (SESSIONS, ("--only", "third"), "holds no session third"),
-        (NUMBERS, ("--level", "95"), "level: needs (0, 1), got 95"),
+        (NUMBERS, ("--level", "95"), "level: needs a number in (0, 1), got 95"),
         (NUMBERS, ("--seed", "-1"), "--seed: needs at least 0"),
         (NUMBERS, ("--figure", "scale.jpg"), "--figure: needs a name that ends in"),
         (NUMBERS, ("--json", "-", "--csv"), "both write to standard output"),

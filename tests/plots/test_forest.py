@@ -71,7 +71,7 @@ def test_what_leaves_the_axis_is_an_arrow_at_its_end(
             {
                 "estimate",
                 "95 % credible interval",
-                "posterior density, each to its own height",
+                "posterior density, scaled in each row",
             },
         ),
         (
@@ -79,7 +79,7 @@ def test_what_leaves_the_axis_is_an_arrow_at_its_end(
             {
                 "estimate",
                 "95 % confidence interval",
-                "resamples of one value, each row to its own height",
+                "resamples by value, scaled in each row",
             },
         ),
     ],

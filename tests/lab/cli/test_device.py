@@ -116,7 +116,7 @@ def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
         (
             ("probe", *EMULATED, "--json", "/dev/full"),
             2,
-            "/dev/full: needs to be a file",
+            "/dev/full: needed a file or a new name",
         ),
         (("probe", *EMULATED, "--json", "no/x"), 2, "--json: needs a folder that"),
         (("check", "--properties", "none.toml"), 2, "none.toml: No such file"),
