@@ -221,13 +221,13 @@ _GUIDELINES: dict[str, tuple[str, str, tuple[_Item, ...]]] = {
             _Item(
                 topic="Device or scale",
                 facts=("device",),
-                to_add="Why this scale and this device; what is known of both.",
+                to_add="Why this scale and this device; what is known about both.",
             ),
             _Item(topic="Subjects: the population that is of interest"),
             _Item(
                 topic="Raters: the population that is of interest",
                 facts=("raters", "characteristics"),
-                to_add="Whom these raters stand for: profession, experience, training.",
+                to_add="Whom these raters represent: profession, experience, training.",
             ),
             _Item(topic="What is known already, and why this study is needed"),
             _Item(topic="Planned subjects, raters, replicates", facts=("sizes",)),
@@ -337,7 +337,7 @@ def _filled(
     if "ratings" in item.sources and facts.ratings is None:
         to_add, names = "There are no ratings yet.", ()
     elif not names:
-        to_add = "For the authors to say."
+        to_add = "To be stated by the authors."
     elif "logs" in item.sources and not (facts.days or to_add):
         to_add = "What no log of a session says."
     item = replace(item, number=number, facts=(), to_add=to_add)

@@ -222,7 +222,7 @@ def test_what_is_typed_is_seen_at_the_prompt() -> None:
     commands = "$ masrel init pilot", "$ masrel schedule pilot"
     run = "$ masrel run pilot --rater R1 --session test --clock simulated"
     text = page(console(*commands), "<!-- typed: stop -->\n" + console(run))
-    assert "stop to stop: stop\nmasrel: session test of R1 was stopped" in renewed(text)
+    assert "or type stop: stop\nmasrel: session test of R1 was stopped" in renewed(text)
 
 
 @pytest.mark.parametrize(

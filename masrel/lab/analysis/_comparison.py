@@ -1,4 +1,4 @@
-"""An analysis held against the limits of gates, or against an earlier analysis.
+"""An analysis compared with the limits of gates, or with an earlier analysis.
 
 Of two documents as `as_analysis_document` makes them every value that differs is named
 by what it is of, and every input whose hash differs.
@@ -94,7 +94,7 @@ def _number(
 
 def _p_value(estimate: Estimate) -> tuple[float, str | None]:
     if not COEFFICIENTS[estimate.coefficient].chance_corrected:
-        return math.nan, f"{estimate.coefficient} has no value that chance gives"
+        return math.nan, f"{estimate.coefficient} has no value expected by chance"
     # the reason is said
     with warnings.catch_warnings(action="ignore", category=UndefinedStatisticWarning):
         return p_value(estimate), estimate.reason
@@ -114,12 +114,14 @@ def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]
     try:
         document = parse_json(read_regular(file, most=MAX_TABLE))
     except ValueError as error:
-        raise ParameterError(f"{option}: {file}: is no analysis: {error}") from error
+        raise ParameterError(
+            f"{option}: {file}: is not an analysis: {error}"
+        ) from error
     is_analysis = isinstance(document, dict) and isinstance(document.get("study"), str)
     head: dict[str, Any] = document if is_analysis else {}
     version, of = head.get("format", 1), head.get("study")
     refuse(
-        (not is_analysis, f"{option}: {file}: is no analysis of a study"),
+        (not is_analysis, f"{option}: {file}: is not an analysis of a study"),
         (
             version != ANALYSIS_FORMAT,
             f"{option}: {file}: needs format {ANALYSIS_FORMAT}, got {version!r}",

@@ -33,8 +33,8 @@ PREDICTORS: dict[str, tuple[str, str]] = {
 """Predictor to its key of a model, or column of the ratings, and its unit."""
 
 _SEPARATED = (
-    "these predictors separate some grades from others without a miss, so that the "
-    "likelihood has no maximum; fewer predictors, or more raters, may help"
+    "these predictors separate some grades perfectly, so the likelihood has no "
+    "maximum; fewer predictors, or more raters, may help"
 )
 
 _Floats = NDArray[np.float64]

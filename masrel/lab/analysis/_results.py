@@ -85,7 +85,7 @@ class PlannedJudge:
     line : JudgeKeys
         What the plan asks for.
     result : AlternativeAnnotatorTest or None
-        Whether the judge may stand for a human; items are presentations.
+        Whether the judge may replace a human; items are presentations.
     reason : str or None
         Why there is no result, or None.
     """

@@ -211,7 +211,7 @@ def trace(
     refuse(
         (
             rate_hz is not None and csv_file is None,
-            "--rate-hz: goes with --csv, whose samples it spaces",
+            "--rate-hz: needs --csv, whose samples it spaces",
         ),
         (
             rate_hz is not None and not math.isfinite(rate_hz),
@@ -220,7 +220,7 @@ def trace(
         (csv_file == Path("-"), "--csv: needs the name of a file, got -"),
         (
             view is not None and output.figure is None,
-            "--view: goes with --figure, whose contents it chooses",
+            "--view: needs --figure, whose contents it chooses",
         ),
     )
     if speed_range is not None:

@@ -53,7 +53,7 @@ def joint() -> None:
 
 
 START_DEG = 30.0
-"""Where a stretch starts unless it is said, deg."""
+"""Where a stretch starts by default, deg."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -57,7 +57,7 @@ _OTHER_OPTIONS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _CompareOptions:
-    """What a report is held against, and whether a change is a failure."""
+    """What a report is compared with, and whether a change is a failure."""
 
     against: Path | None
     no_change: bool

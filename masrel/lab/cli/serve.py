@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from masrel.lab.serve._access import Access
 
 PORT = 8723
-"""The port where nothing else is said: a tablet finds the pages again."""
+"""The default port, always the same: a tablet finds the pages again."""
 
 _LIBRARIES = ("starlette", "uvicorn", "segno")
 
@@ -87,7 +87,7 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
 
 
 def _show(access: "Access") -> None:
-    """Print addresses that nobody has opened yet."""
+    """Print addresses that have not been opened yet."""
     from masrel.lab.serve._access import ROLES, qr_lines
 
     for role in ROLES:

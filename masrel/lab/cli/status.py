@@ -1,4 +1,4 @@
-"""``masrel status``: how far a study is, and what to do next."""
+"""``masrel status``: the progress of a study, and what to do next."""
 
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any

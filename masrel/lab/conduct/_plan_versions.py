@@ -72,7 +72,7 @@ class PlanChange:
 
     def __str__(self) -> str:
         was, is_ = self.before or "not planned", self.after or "gone"
-        when = "nobody has recorded it"
+        when = "not recorded yet"
         if self.time_utc is not None:
             when = f"recorded on {self.time_utc[:10]}"
         return f"Change of the plan: {self.key} was {was}, then {is_}; {when}"

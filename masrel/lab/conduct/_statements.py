@@ -435,7 +435,7 @@ def record_unblinding(
     session: str | None = None,
     now: Callable[[], datetime] = utc_now,
 ) -> tuple[tuple[Schedule, Presentation], ...]:
-    """Record that somebody learns which model a code stands for, and return it.
+    """Record that somebody learns which model a code is, and return it.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ from masrel.lab.ratings import (
 from masrel.lab.run import read_log
 
 MISSING = "NA"
-"""What stands for a missing value in tables of masrel."""
+"""How tables of masrel show a missing value."""
 
 Column = dict[str, object]
 """What a column of a table is, by the keys of BIDS."""

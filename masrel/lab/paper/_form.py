@@ -1,4 +1,4 @@
-"""What a sheet asks for, and what was typed of it, held against that."""
+"""What a sheet asks for, compared with what was typed."""
 
 import csv
 import hashlib
@@ -339,7 +339,7 @@ def _refuse_other_sheet(sheet: TypedSheet, form: Form, others: Iterable[Form]) -
 
 def _whose(form: Form | None) -> str:
     if form is None:
-        return "a sheet of another study or of a schedule that was drawn anew"
+        return "a sheet of another study or of a schedule that was drawn again"
     return f"that of rater {form.rater} in session {form.session}"
 
 
@@ -375,7 +375,8 @@ def _filled_row(
         problems.append(f"{where}: {_needed_grade(grades, grade)}")
     if not is_graded and grade:
         problems.append(
-            f"{where}: grade: needed of presentations, got {shortened(grade)!r}"
+            f"{where}: grade: needed only in rows of presentations, got "
+            f"{shortened(grade)!r}"
         )
     about: When = "presentation" if isinstance(place, int) else place
     for when, columns in form.questions.items():

@@ -527,7 +527,7 @@ def model_rules(model: Model, elbow: ElbowConstants) -> Iterator[str]:
         if model.parameters:
             yield (
                 f"parameters: needed a kind of model that has some, got "
-                f"{got(DEFAULT_KIND)}, whose numbers stand beside its id and in "
+                f"{got(DEFAULT_KIND)}, whose numbers are beside its id and in "
                 "constants"
             )
         joint = msgspec.structs.replace(elbow, **model.overrides)
@@ -553,7 +553,7 @@ def _tone_keys(model: Model) -> Iterator[str]:
     for key in (*keys, *(f"constants.{key}" for key in model.overrides)):
         yield (
             f"{key}: needed for kind {got(DEFAULT_KIND)} only, got it for "
-            f"{got(model.kind)}; its numbers stand in [models.parameters]"
+            f"{got(model.kind)}; its numbers are in [models.parameters]"
         )
     for key, problem in value_problems(model.kind, model.parameters):
         yield f"parameters{'.' if key else ''}{key}: {problem}"
@@ -710,7 +710,7 @@ def _judge(line: JudgeKeys, protocol: Protocol) -> Iterator[str]:
     return _broken(
         (
             line.id in {each.id for each in protocol.analysis.estimates},
-            f"id: {got(line.id)} is an estimate of the plan, too",
+            f"id: {got(line.id)} is also an estimate of the plan",
         ),
         (
             line.session not in raters,

@@ -118,7 +118,7 @@ def field_value(field: RaterField, value: object) -> FieldValue | None:
 
 
 def parsed_value(field: RaterField, text: str) -> FieldValue | None:
-    """Return the value that a text stands for, or None if it stands for none."""
+    """Return the value that a text means, or None if it means none."""
     kind = {"whole": int, "number": float}.get(field.type, str)
     try:
         return field_value(field, kind(text.strip()))

@@ -361,7 +361,7 @@ class EstimatePlan(_Table, frozen=True, kw_only=True):
 
 
 class JudgeKeys(_Table, frozen=True, kw_only=True):
-    """``[[analysis.judges]]``: a rater who may stand for one of the others, or not."""
+    """``[[analysis.judges]]``: a rater who may replace one of the others."""
 
     id: _Identifier
     judge: _Identifier

@@ -222,10 +222,10 @@ def _of_sessions(
     for log in there:
         if log not in expected:
             yield (
-                f"{_name(study, log)} is of no rater and session of the protocol: its "
-                "grades are not among the ratings. Put the rater back into the session "
-                "(masrel record withdraw keeps the grades of one who left, and says "
-                "so), or move the log out of the study."
+                f"{_name(study, log)} belongs to no rater and session of the protocol: "
+                "its grades are not among the ratings. Put the rater back into the "
+                "session (masrel record withdraw keeps the grades of one who left), or "
+                "move the log out of the study."
             )
         elif log.stat().st_size:
             yield from _of_days(study, log, include)
@@ -239,7 +239,7 @@ def _of_sessions(
     for folder in sorted(path for path in study.sessions.glob("*") if path.is_dir()):
         if folder.with_name(f"{folder.name}.jsonl") not in there:
             yield (
-                f"{_name(study, folder)} has recordings and there is no log of them: "
+                f"{_name(study, folder)} has recordings but no log: "
                 "their grades are not among the ratings. Put a copy of the log back."
             )
 
@@ -258,8 +258,8 @@ def _of_skips(study: StudyPaths, log: Path, include: Collection[str]) -> Iterato
     _, state = _read(log)
     if state.n_set_aside:
         yield (
-            f"{_name(study, log)}: the session was begun anew; grades from before, "
-            f"which stay in the log and are not among the ratings: {state.n_set_aside}."
+            f"{_name(study, log)}: the session was started again; earlier grades, "
+            f"kept in the log but not among the ratings: {state.n_set_aside}."
         )
     for code, event in state.skipped.items():
         if code not in state.grades:

@@ -190,8 +190,8 @@ def _table_problem(study: StudyPaths, protocol: Protocol) -> tuple[bool, str]:
     more = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
     return is_stale, (
         f"{path}: is {'out of date' if is_stale else 'not what the session logs say'}: "
-        f"{differences[0]}{more}; masrel ratings writes it anew, --ratings {path} uses "
-        "it as it is"
+        f"{differences[0]}{more}; masrel ratings writes it again, --ratings {path} "
+        "uses it as it is"
     )
 
 
@@ -289,7 +289,7 @@ def ratings_from_logs(
     protocol : Protocol
         The study's protocol.
     check_recordings : bool, optional
-        Whether recordings are held against the checksums of the logs.
+        Whether recordings are checked against the checksums of the logs.
 
     Returns
     -------

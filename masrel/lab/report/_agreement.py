@@ -60,8 +60,8 @@ from masrel.tables._tables import (
 )
 
 _AGREEMENTS = (
-    "p_o: observed agreement; p_e: agreement expected by chance, 0 where the "
-    "coefficient takes none off."
+    "p_o: observed agreement; p_e: agreement expected by chance, 0 if the "
+    "coefficient does not allow for chance."
 )
 
 _BANDS: BandScale = "landis_koch"
@@ -126,7 +126,7 @@ def estimates_section(material: Material) -> Iterator[Content]:
 
 
 def judge_tables(material: Material) -> Iterator[Table]:
-    """Show whether a judge of the plan may stand for a human; nothing without one."""
+    """Show whether a judge of the plan may replace a human; nothing without one."""
     rows: list[dict[str, Value]] = []
     for entry in material.analysis.judges:
         line, result = entry.line, entry.result
@@ -386,8 +386,8 @@ def categories_section(material: Material) -> Iterator[Content]:
         ),
         rows=tuple(_category_rows(entry, ratings, level)),
         notes=(
-            "Agreement: how often, where one rater gave the grade, another rater of "
-            f"the model gave it too. Interval: its {percent(level)} % confidence "
+            "Agreement: how often a grade that one rater gave was also given by "
+            f"another rater of the model. Interval: its {percent(level)} % confidence "
             "interval for these raters on other models like these. κ: Fleiss', of the "
             "grade against all others.",
         ),

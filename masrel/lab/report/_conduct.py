@@ -421,7 +421,7 @@ def _changes_table(material: Material, conduct: StudyConduct) -> Table:
             {
                 **asdict(change),
                 "before": change.before or "not planned",
-                "after": change.after or "not planned any more",
+                "after": change.after or "no longer planned",
                 "recorded": (change.time_utc or "no")[:10],
             }
             for change in conduct.changes

@@ -156,7 +156,7 @@ def _constants(material: Material) -> Iterator[Table]:
         caption = "Constants all spastic elbows share"
     yield Table(
         name="constants",
-        caption=caption + ", but for those in the table below" * bool(single),
+        caption=caption + ", except those in the table below" * bool(single),
         columns=_CONSTANT_COLUMNS,
         rows=tuple(shared),
         data=material.data,

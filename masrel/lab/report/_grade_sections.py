@@ -79,8 +79,8 @@ def felt_sentences(material: Material) -> str:
     if made.n_grip_lost:
         sentences.append(
             f"In {made.n_grip_lost} of {counted(made.n_presentations, 'presentation')} "
-            "the arm came loose and the model let it go: the grade may be of less than "
-            "the model has."
+            "the arm came loose and the model let it go: the rater may not have felt "
+            "the whole model."
         )
     return " ".join(sentences)
 

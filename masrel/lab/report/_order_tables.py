@@ -283,8 +283,8 @@ def summary_table(balances: Sequence[_OrderBalance]) -> Table:
         ),
         read=(_CONCEALED,),
         notes=(
-            "How often a model stands in one place of the session, and an ordered pair "
-            "of two models side by side: fewest to most. Twice in a row: schedules in "
+            "How often a model has one place of the session, and how often one model "
+            "follows another: fewest to most. Twice in a row: schedules in "
             "which a model follows itself. Runs: the longest of any schedule.",
         ),
         data="recorded",
@@ -309,7 +309,7 @@ def count_tables(balance: _OrderBalance) -> Iterator[Table]:
     parts = list(pairwise(n_places * part // n_parts for part in range(n_parts + 1)))
     yield Table(
         name="places",
-        caption=f"How often each model stands in each place, {of_session}",
+        caption=f"How often each model is in each place, {of_session}",
         columns=(
             Column(key="model", heading="Model", align="left"),
             *(Column(key=f"p{a}", heading=_part(a, b)) for a, b in parts),

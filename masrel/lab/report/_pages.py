@@ -96,7 +96,7 @@ _OPTIONS = {
 
 @cache
 def _pandoc() -> str:
-    """Return the path of pandoc, or refuse to go on without it."""
+    """Return the path of pandoc, or refuse to continue without it."""
     try:
         import pypandoc
 
@@ -110,7 +110,7 @@ def _pandoc() -> str:
 
 
 def pandoc_version() -> str:
-    """Return the version of pandoc, or refuse to go on without it."""
+    """Return the version of pandoc, or refuse to continue without it."""
     shown = subprocess.run([_pandoc(), "--version"], capture_output=True, check=True)
     return shown.stdout.decode().split()[1]
 

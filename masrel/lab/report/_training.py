@@ -38,14 +38,14 @@ from masrel.tables._tables import (
     tag_of,
 )
 
-NOT_RATINGS = "Nothing of a training enters the ratings of the study."
+NOT_RATINGS = "Trainings never enter the ratings of the study."
 
 
 def outcome(record: TrainingRecord) -> str:
     """Return in words how a training ended."""
     n_presentations = len(record.lessons)
     if record.passed is None:
-        return f"goes on, {counted(n_presentations, 'presentation')} so far"
+        return f"continues, {counted(n_presentations, 'presentation')} so far"
     word = "passed" if record.passed else "not passed"
     return f"{word} after {counted(n_presentations, 'presentation')}"
 
@@ -88,8 +88,8 @@ def training_tables(record: TrainingRecord, *, level: float) -> tuple[Table, Tab
         ),
         notes=(
             f"κ with the intended grades, {criterion.weights} weights, of the last "
-            f"{CURVE_SETS * criterion.n_models} presentations; each interval holds by "
-            "itself.",
+            f"{CURVE_SETS * criterion.n_models} presentations; each interval holds "
+            "separately.",
             f"Passed at evidence {number(record.boundary, 2)}: the largest, of all "
             f"runs of at most {criterion.window} presentations up to the last, of "
             f"their number times what κ has above {criterion.reference}.",

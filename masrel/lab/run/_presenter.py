@@ -166,7 +166,7 @@ class Presenter:
         if stop.reason in _TERMINATING:
             raise SessionStoppedError(
                 f"{self._place(request)} was stopped by {stop.reason} at presentation "
-                f"{request.presentation.position}; the same command goes on there"
+                f"{request.presentation.position}; the same command resumes it there"
             )
         return outcome
 
@@ -224,7 +224,7 @@ def _kind_of(request: GradeRequest) -> Literal["presented", "practised"]:
 def check_same(
     path: Path, begun: Mapping[str, Facts], same: Mapping[str, Facts]
 ) -> None:
-    """Refuse to go on with a log that was begun with anything else."""
+    """Refuse to resume a log that was begun with anything else."""
     for name in ("grades", *same):  # which says most comes first
         value, was = same[name], begun.get(name, False)  # there once were no rehearsals
         if was != value and not (name == "grades" and may_go_on(was, value)):

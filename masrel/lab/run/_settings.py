@@ -113,8 +113,8 @@ def device_notes(protocol: Protocol, study: StudyPaths) -> Iterator[str]:
         setup = DeviceSetup(clock=RealClock(), options=backend_options(settings))
         if build_device(settings.backend, setup).holds_torque_when_silent:
             yield (
-                f'device.backend: "{settings.backend}" goes on with its last torque '
-                "when nothing is sent any more, as after a cable comes off: have an "
+                f'device.backend: "{settings.backend}" keeps its last torque when '
+                "nothing more is sent, as after a cable comes off: have an "
                 "emergency switch in the supply of its motor within reach"
             )
     yield from calibration_notes(study, protocol, lambda: moves_hardware(settings))

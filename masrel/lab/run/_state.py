@@ -396,7 +396,7 @@ def _apply(state: SessionState, event: Event) -> None:
 
 
 def _set_aside(state: SessionState) -> None:
-    # what was before the session begins anew: it stays in the log, and counts no more
+    # what was before the session begins again: it stays in the log, and counts no more
     fresh = SessionState(
         header=state.header,
         source=state.source,

@@ -29,9 +29,9 @@ _CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
 _REMARKS = {
     "time-limit": "The time limit ended the presentation: no stretch begins later than "
     "{limit_s:g} s after the first movement.\n",
-    "max-duration": "The presentation was ended: it had gone on for too long.\n",
-    "too-slow": "That was too slow to feel the catch: once more? Then say again.\n",
-    "grip-lost": "The arm came loose, and the model let go: once more? Say again.\n",
+    "max-duration": "The presentation was ended because it took too long.\n",
+    "too-slow": "That was too slow to feel the catch. To repeat it, type again.\n",
+    "grip-lost": "The arm came loose and the model let go. To repeat it, type again.\n",
 }
 """A line each of what a rater has to know of a presentation."""
 
@@ -94,8 +94,8 @@ class ConsoleGrades(GradeSource):
             request,
             f"{label}Presentation {presentation.position} of "
             f"{request.n_presentations}, code {presentation.code}{again}. "
-            f"{_instruction(request.rules)}Enter to begin (then any other key is an "
-            "emergency stop), stop to stop: ",
+            f"{_instruction(request.rules)}Press Enter to begin (then any other key is "
+            "an emergency stop), or type stop: ",
         )
 
     def _ask_or_correct(self, request: GradeRequest, question: str) -> str:
@@ -206,7 +206,7 @@ class ConsoleGrades(GradeSource):
             if request.may_skip and word.casefold() == "skip":
                 if why.strip():
                     return Skip(who=request.rater, why=why.strip())
-                self._say("To skip it needs a reason: skip the motor is hot.\n")
+                self._say("Skipping needs a reason, such as: skip the motor is hot.\n")
 
     def instruct(self, request: GradeRequest, text: str) -> None:
         """Show the instructions, and wait until the rater has read them.
@@ -223,7 +223,7 @@ class ConsoleGrades(GradeSource):
         SessionStoppedError
             If the person stops, or the input ends.
         """
-        self._wait(request, f"{text.strip()}\nEnter to go on, stop to stop: ")
+        self._wait(request, f"{text.strip()}\nPress Enter to continue, or type stop: ")
 
     def take_break(self, request: GradeRequest, minutes: float) -> None:
         """Say that there is a break, and wait until the rater goes on.
@@ -243,7 +243,8 @@ class ConsoleGrades(GradeSource):
         unit = "minute" if minutes == 1 else "minutes"
         self._wait(
             request,
-            f"A break of {minutes:g} {unit}. Enter after it to go on, stop to stop: ",
+            f"A break of {minutes:g} {unit}. Then press Enter to continue, or type "
+            "stop: ",
         )
 
     def _say_remarks(self, request: GradeRequest) -> None:
@@ -255,7 +256,7 @@ class ConsoleGrades(GradeSource):
             pass
 
     def begins_anew(self, request: GradeRequest, days: int) -> bool:
-        """Ask whether a session goes on or begins anew.
+        """Ask whether a session is resumed or begins again.
 
         Parameters
         ----------
@@ -280,7 +281,7 @@ class ConsoleGrades(GradeSource):
                 request,
                 f"This session was left {when}, before presentation "
                 f"{request.presentation.position} of {request.n_presentations}. Go on, "
-                "or begin anew, and what was graded counts no more? (go on; anew; "
+                "or begin anew? Then the earlier grades no longer count. (go on; anew; "
                 "stop): ",
             )
             if answer in ("go on", "anew"):
@@ -371,8 +372,8 @@ class PaperGrades(ConsoleGrades):
         while True:
             answer = self._ask(
                 request,
-                f"Grade {request.presentation.code} on the sheet. Enter to go on "
-                "(again; stop): ",
+                f"Grade {request.presentation.code} on the sheet. Enter to "
+                "continue (again; stop): ",
             )
             if answer in ("", "again"):
                 return None if answer else OnSheet()
@@ -396,12 +397,12 @@ def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:
     stretches = rules.stretches
     if stretches == 1:
         return ""
-    done = "Enter says done" if rules.done_with == "enter" else "the button says done"
+    done = "press Enter" if rules.done_with == "enter" else "press the button"
     if stretches == "free":
         then = "" if on_paper else f", then {done}"
         return f"Stretch the arm as often as you want{then}. "
     if isinstance(stretches, int):
-        before = "" if on_paper else f"; {done} before"
+        before = "" if on_paper else f"; {done} to end earlier"
         return (
             f"Stretch the arm {stretches} times and bring it back each time{before}. "
         )
@@ -488,5 +489,5 @@ def _stopped(request: GradeRequest | QuestionRequest, why: str) -> SessionStoppe
         where = f"presentation {place} of {n_presentations}"
     return SessionStoppedError(
         f"session {request.session} of {request.rater} was stopped {why} at {where}; "
-        "the same command goes on there"
+        "the same command resumes it there"
     )

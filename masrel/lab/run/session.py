@@ -106,7 +106,7 @@ def run_session(
     progress: Callable[[Presentation], object] | None = None,
     now: Callable[[], datetime] = utc_now,
 ) -> SessionSummary:
-    """Run one rater's session to its end, or go on with it.
+    """Run one rater's session to its end, or resume it.
 
     A rehearsal has an order and codes of its own, and leaves its log and recordings in
     ``rehearsals/``: nothing of it enters the study's ratings. When it is complete, the
@@ -304,9 +304,9 @@ class _Runner(Presenter):
         days = days_since(last, self._now)
         if policy == "same-day" and days != 0:
             raise SessionLogError(
-                f"{self._log.path}: was left on {last[:10]}: needed to go on on the "
-                'same day, as the protocol has occasions.resume = "same-day"; with '
-                '"always" it goes on, with "restart" it begins anew'
+                f"{self._log.path}: was left on {last[:10]}: must be resumed on the "
+                'same day, because the protocol has occasions.resume = "same-day"; '
+                '"always" resumes it later, "restart" begins it again'
             )
         restart = policy == "restart"
         if policy == "ask":

@@ -159,7 +159,7 @@ def write_schedules(
         elif (problem := _refusal(study, place, fault[0], redraw=redraw)) is not None:
             problems.append(problem)
     problems += (
-        f"{sentence}; --redraw draws those anew whose sessions have not begun"
+        f"{sentence}; --redraw draws again those whose sessions have not begun"
         for sentence in _stale_sentences(protocol, study, stale, len(every))
     )
     if problems:
@@ -294,7 +294,7 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         (
             study.published_secret_file.is_file(),
             f"{study.published_secret_file}: the secret is published, so that codes "
-            "and orders drawn from it conceal nothing from who has read it",
+            "and orders drawn from it are concealed no longer",
         ),
         (
             from_seed,
@@ -303,9 +303,9 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         ),
         (
             of_others,
-            f"{study.schedules}: {of_others} of {len(schedules)} schedules are of a "
-            "secret that is not in the study: they stay good, and cannot be drawn "
-            "again for comparison",
+            f"{study.schedules}: {of_others} of {len(schedules)} schedules were "
+            "drawn from a secret that is not in the study: they stay valid, but cannot "
+            "be drawn again for comparison",
         ),
     )
     return (*(note for is_so, note in notes if is_so), *_open_to_others(study))
@@ -340,14 +340,14 @@ def _open_to_others(study: StudyPaths) -> Iterator[str]:
     ):
         if folder.is_dir() and folder.stat().st_mode & 0o077:
             yield (
-                f"{folder}: other users of this computer may read what names the "
-                f"models; chmod 700 {shlex.quote(str(folder))} forbids it"
+                f"{folder}: other users of this computer can read which models were "
+                f"presented; chmod 700 {shlex.quote(str(folder))} prevents it"
             )
     logs = [f"{log}" for log in study.conduct_logs() if log.stat().st_mode & 0o077]
     if logs:
         yield (
-            f"{listed(logs)}: other users of this computer may read who did what and "
-            f"why; chmod 600 {shlex.join(logs)} forbids it"
+            f"{listed(logs)}: other users of this computer can read who did what and "
+            f"why; chmod 600 {shlex.join(logs)} prevents it"
         )
 
 
@@ -385,7 +385,7 @@ def _refusal(
         (
             log.exists(),
             f"It was not drawn, because the session has begun: {log} was "
-            "recorded by the schedule there was. Bring back that schedule and its "
+            "recorded with the earlier schedule. Restore that schedule and its "
             "protocol, or move the log out of the study",
         ),
         (
@@ -395,12 +395,12 @@ def _refusal(
         ),
         (
             typed.exists(),
-            "It was not drawn, because its sheet was printed, and what is on paper "
-            f"could not be entered any more. Move {typed} out of the study first",
+            "It was not drawn, because its sheet was printed and could then no "
+            f"longer be entered. Move {typed} out of the study first",
         ),
         (
             study.schedule_file(*place).exists() and not redraw,
-            "It was kept; --redraw draws it anew",
+            "It was kept; --redraw draws it again",
         ),
     )
     return next((f"{fault}. {why}" for is_so, why in rules if is_so), None)

@@ -118,12 +118,12 @@ class Access:
             If it does not.
         """
         if (known := _same(self._tokens, role, token)) is None:
-            new = "masrel serve prints a new one where it runs, at Enter"
+            new = "press Enter in the terminal of masrel serve for a new one"
             if role == "rater":
                 new = "the coordinator's page makes a new one"
             if _same(self._used, role, token) is not None:
                 raise AccessError(f"This address was opened before; {new}.")
-            raise AccessError(f"This address is not one of this study now; {new}.")
+            raise AccessError(f"This address is no longer valid; {new}.")
         self._tokens.remove(known)
         self._used.append(known)
         visitor = Visitor(role, secrets.token_hex(16))
@@ -218,7 +218,7 @@ def _read_tablets(file: Path) -> dict[str, str]:
     except (ValueError, TypeError, KeyError, AttributeError):
         raise ParameterError(
             f"{file}: needed JSON with the rater of each tablet, got another text; "
-            "without this file every tablet is nobody's"
+            "without this file no tablet belongs to a rater"
         ) from None
 
 

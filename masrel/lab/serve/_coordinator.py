@@ -110,7 +110,7 @@ ACTIONS = {
         record_answer,
         (*_SESSION, "question", *_SIGNED),
         dict.fromkeys(("answer", "code")),
-        "The answer to {question} is corrected; what it was stays in the log.",
+        "The answer to {question} is corrected; the original stays in the log.",
     ),
     "day": _Action(
         record_day,
@@ -267,7 +267,7 @@ class CoordinatorPages(Pages):
 
     async def _leave(self, fields: Fields) -> str:  # noqa: ARG002 - as all
         await self._manager.leave()
-        return "The session is stopped; it goes on where it was."
+        return "The session is stopped; it can be resumed."
 
     async def _correct(self, fields: Fields) -> str:
         where = needed(fields, *_SESSION)
@@ -275,7 +275,7 @@ class CoordinatorPages(Pages):
         if texts["grade"] == "NA":
             texts["grade"] = None
         await self._manager.correct(**where, **texts)
-        return f"{texts['code']} is corrected; what it was stays in the log."
+        return f"{texts['code']} is corrected; the original stays in the log."
 
     async def _tablet(self, fields: Fields) -> dict[str, Any]:
         rater = text(fields, "rater")
@@ -285,7 +285,7 @@ class CoordinatorPages(Pages):
             )
         address = self._access.new_address("rater", rater)
         whose = rater or "the rater of the next session"
-        sentence = f"This address lets in one tablet, that of {whose}, once."
+        sentence = f"This address works once, for the tablet of {whose}."
         return {"text": sentence, "address": address, "picture": qr_svg(address)}
 
     async def _job(self, fields: Fields) -> str:

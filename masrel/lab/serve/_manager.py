@@ -120,7 +120,7 @@ class SessionManager:
         self._following: set[asyncio.Task[None]] = set()
 
     async def start(self, rater: str, session: str, *, rehearsal: bool = False) -> None:
-        """Start a session, or go on with it.
+        """Start a session, or resume it.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class SessionManager:
         async with self._starting:
             if (other := self._running) is not None:
                 raise ParameterError(
-                    "session: needed none that runs, "
+                    "session: needed no other session running, "
                     f"got {other.session} of {other.rater}"
                 )
             await asyncio.to_thread(_check_session, self.study, rater, session)
@@ -175,7 +175,7 @@ class SessionManager:
         running.writer.close()
         code = await running.process.wait()
         if self._running is running:
-            text = f"the process of the session ended without a word (code {code})"
+            text = f"the process of the session ended without a message (code {code})"
             self._end(running, {"how": "failed", "text": text})
 
     def _end(self, running: _Running, over: Message) -> None:
@@ -240,7 +240,7 @@ class SessionManager:
             raise AskOverError("no session runs")
         if ask not in running.answered:
             if ask != running.ask:
-                raise AskOverError("this is not asked any more")
+                raise AskOverError("this is no longer asked")
             running.answered[ask] = answer, _future()
             running.send({"kind": "answer", "ask": ask, "answer": answer})
         before, future = running.answered[ask]

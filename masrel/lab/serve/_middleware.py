@@ -113,7 +113,7 @@ class Middleware:
                 raise HTTPException(405, "Nothing can be sent to this address.")
             return None
         if visitor is None and others:
-            raise HTTPException(403, f"This is for the {role} alone.")
+            raise HTTPException(403, f"This is only for the {role}.")
         if visitor is None:
             raise HTTPException(
                 401,
@@ -130,20 +130,20 @@ class Middleware:
     def _check_sender(self, scope: Scope, headers: Headers) -> None:
         """Refuse what a page of somebody else makes a browser send."""
         if scope["method"] not in ("GET", "HEAD", "POST"):
-            raise HTTPException(405, "This address knows GET and POST only.")
+            raise HTTPException(405, "This address accepts only GET and POST.")
         if headers.get("host", "").lower() not in self._access.hosts:
             # a foreign name that its owner has made to mean this computer
             where = self._access.origin
             raise HTTPException(421, f"These pages are at {where} and nowhere else.")
         origin, site = headers.get("origin"), headers.get("sec-fetch-site")
         if origin is None and scope["method"] == "POST":
-            raise HTTPException(403, "What is sent needs the header Origin.")
+            raise HTTPException(403, "The request needs the header Origin.")
         is_link = headers.get("sec-fetch-mode") == "navigate"
         if (origin is not None and origin not in self._access.origins) or (
             site in ("cross-site", "same-site")
             and not (is_link and scope["method"] == "GET")
         ):
-            raise HTTPException(403, "This was sent by a page of somebody else.")
+            raise HTTPException(403, "This was sent by a page of another site.")
 
     def _check_budget(self, scope: Scope, visitor: Visitor | None) -> None:
         """Refuse more requests than a person makes; an emergency stop never is."""
@@ -152,14 +152,14 @@ class Middleware:
                 return
         elif self._without.allow(_client(scope)):
             return
-        raise HTTPException(429, "These are too many requests; wait a second.")
+        raise HTTPException(429, "Too many requests; wait a second.")
 
     def _check_page(self, headers: Headers, visitor: Visitor) -> None:
         """Refuse what was not sent by a page that this server has made."""
         if not self._access.is_csrf(visitor, headers.get("x-masrel-csrf", "")):
-            raise HTTPException(403, "What is sent needs the header X-Masrel-CSRF.")
+            raise HTTPException(403, "The request needs the header X-Masrel-CSRF.")
         if headers.get("content-type", "").partition(";")[0] != "application/json":
-            raise HTTPException(415, "What is sent needs to be application/json.")
+            raise HTTPException(415, "The request must be application/json.")
 
     def _open(self, scope: Scope, visitor: Visitor | None) -> Response:
         """Let a browser in by its one-time address."""
@@ -219,7 +219,7 @@ def _check_sizes(scope: Scope) -> None:
 
 async def _sent_fields(request: Request) -> dict[str, object]:
     """Return the object in JSON that was sent, which has a limit."""
-    long = HTTPException(413, f"What is sent needs at most {_MAX_BODY} bytes.")
+    long = HTTPException(413, f"The request may have at most {_MAX_BODY} bytes.")
     length = request.headers.get("content-length", "0")
     if not length.isdecimal() or len(length) > 9 or int(length) > _MAX_BODY:
         raise long
@@ -238,7 +238,7 @@ async def _sent_fields(request: Request) -> dict[str, object]:
     except ValueError:
         document = None
     if not isinstance(document, dict):
-        raise HTTPException(400, "What is sent needs to be an object in JSON.")
+        raise HTTPException(400, "The request must be a JSON object.")
     return document
 
 

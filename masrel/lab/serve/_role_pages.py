@@ -182,7 +182,7 @@ class RaterPages(Pages):
         if state["screen"] != "presenting" or any(
             fields.get(name) != state[name] for name in _PRESENTED
         ):  # it has come late, after a connection that was lost
-            raise HTTPException(409, "this is not presented any more")
+            raise HTTPException(409, "this is no longer presented")
         self._manager.done()
 
     async def _stop(self, *_: object) -> None:
@@ -194,7 +194,7 @@ class RaterPages(Pages):
         last, running = (await self._shown(request)).get("last"), self._manager.running
         code, grade, why = (fields.get(name) for name in ("code", "grade", "why"))
         if running is None or not last or last["code"] != code:
-            raise HTTPException(409, "this grade is not the last one any more")
+            raise HTTPException(409, "this is no longer the last grade")
         if not isinstance(grade, str) or not isinstance(why, str):
             raise HTTPException(422, "needed a grade, and why it is corrected")
         rater, session, rehearsal = running

@@ -230,7 +230,7 @@ def alone(study: StudyPaths) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise ParameterError(
-                f"{study.root}: needed a study that nobody serves, got one that "
+                f"{study.root}: needed a study that is not being served, got one that "
                 "another masrel serve has open"
             ) from None
         yield

@@ -52,7 +52,7 @@ MAX_LINE = 1 << 20
 _Checked = TypeVar("_Checked")
 
 _OTHER_ENDS_S = 10.0  # within this a process ends whose server is gone
-_GONE = {"kind": "leave", "why": "as the server is gone", "who": "server gone"}
+_GONE = {"kind": "leave", "why": "because the server stopped", "who": "server gone"}
 
 
 def encoded(message: Message) -> bytes:
@@ -194,7 +194,7 @@ class PageGrades(GradeSource):
         """Return whether a session begins anew that was left so many days ago."""
 
         def checked(message: Message) -> bool:
-            return _truth(message, "anew", "the session begins anew")
+            return _truth(message, "anew", "the session begins again")
 
         return self._ask(request, "anew", checked, days=days)
 

@@ -50,9 +50,9 @@ def train_rater(
     feedback: Callable[[Lesson], object] | None = None,
     now: Callable[[], datetime] = utc_now,
 ) -> TrainingRecord:
-    """Train a rater until the criterion is met, or go on with it.
+    """Train a rater until the criterion is met, or resume.
 
-    Nothing of a training enters the ratings of the study.
+    Trainings never enter the ratings of the study.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def train_rater(
     if not path.exists() and any(path.with_suffix("").glob("*.npz")):
         raise SessionLogError(
             f"{path}: is gone, and there are recordings in {path.with_suffix('')}: put "
-            "the log back from a copy, or move these recordings away to begin anew"
+            "the log back from a copy, or move these recordings away to begin again"
         )
     with SessionLog.open(path, now=now) as log:
         check_events(path, log.events)

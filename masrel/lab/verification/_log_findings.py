@@ -368,5 +368,5 @@ def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Fi
                 path,
                 f"line {anchor.line}: needed the anchored SHA-256 {anchor.sha256}, "
                 f"got {of_log[anchor.line - 1]}: this line or one before it was "
-                "changed, and the chain computed anew",
+                "changed, and the chain computed again",
             )

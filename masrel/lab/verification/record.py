@@ -1,4 +1,4 @@
-"""The record of a study, from protocol to report, each file held against the last."""
+"""The record of a study, from protocol to report, each file compared with the last."""
 
 import hashlib
 import os
@@ -254,10 +254,10 @@ def _of_logs(
         elif path.suffix == ".partial":
             yield doubt(
                 path,
-                "a presentation that goes on, or was cut off; going on recovers it",
+                "a presentation that goes on, or was cut off; resuming recovers it",
             )
         elif path.parent in going_on and path.with_suffix(".partial").exists():
-            yield doubt(path, "is not in its log yet; going on with it logs it")
+            yield doubt(path, "is not in its log yet; resuming the session logs it")
         elif path.suffix == ".jsonl":
             yield broken(path, f"is the log of no {whose} of the protocol")
         elif path.suffix in {".npz", ".json"}:
@@ -280,14 +280,16 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
         if study.logs():
             yield from _table_findings(study, protocol)
         elif table.is_file():
-            yield doubt(table, "no session log stands behind this table")
+            yield doubt(table, "no session log supports this table")
         if study.analysis_file.is_file():
             yield from _numbers_findings(study, protocol, study.analysis_file, computed)
         if manifest.is_file():
             yield from _report_findings(study, protocol, manifest, computed)
     except MasrelError as error:
         for path in files:
-            yield broken(path, f"cannot be held against what it is made from: {error}")
+            yield broken(
+                path, f"cannot be compared with what it was made from: {error}"
+            )
 
 
 def _table_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
@@ -297,7 +299,7 @@ def _table_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
         is_stale, differences = _table_differences(study, protocol, path)
         for difference in differences[:_SHOWN]:
             yield (stale if is_stale else broken)(
-                path, f"{difference}; masrel ratings writes it anew"
+                path, f"{difference}; masrel ratings writes it again"
             )
         if len(differences) > _SHOWN:
             yield broken(
@@ -328,7 +330,7 @@ def _numbers_findings(
         yield doubt(
             path,
             f"made by masrel {version}, not rebuilt by this, {masrel.__version__}: "
-            "only what it was made from is looked at",
+            "only what it was made from is checked",
         )
     made_of = report or numbers.get("inputs")
     of = _Numbers(
@@ -350,7 +352,7 @@ def _numbers_findings(
     )
     words = _EARLIER if is_earlier else difference + unknown
     yield (broken if is_known and not is_earlier else stale)(
-        place, f"{words}; masrel {verb} makes it anew"
+        place, f"{words}; masrel {verb} makes it again"
     )
 
 
@@ -480,7 +482,7 @@ def _report_findings(
         yield broken(manifest, needed)
         return
     if document["format"] == _HASHED_NAMES:
-        yield doubt(manifest, "is of an earlier version; masrel report makes it anew")
+        yield doubt(manifest, "is of an earlier version; masrel report makes it again")
     beside = ("include", "claims_sha256")  # what is shown of the same, and of others
     of = {key: value for key, value in inputs.items() if key not in beside}
     yield from _numbers_findings(

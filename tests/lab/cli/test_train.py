@@ -135,7 +135,7 @@ def test_a_person_is_told_the_grade_after_each_and_goes_on_after_a_stop(
     answers(monkeypatch, "", "1", "", "again", "", "2", "stop")
     stopped = masrel(*call)
     assert stopped.code == 1
-    assert "presentation 3 of 32; the same command goes on there" in stopped.err
+    assert "presentation 3 of 32; the same command resumes it there" in stopped.err
     record = read_training(
         StudyPaths(study), read_protocol(study / "protocol.toml"), "R1"
     )

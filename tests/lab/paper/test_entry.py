@@ -207,7 +207,7 @@ def test_a_rater_is_asked_about_the_study_on_the_sheet_of_the_last_session(
         (3, 4, "", "row 4: arm.realism: needed a whole number, 1 to 10, got none "
          "(NA: was left out)"),
         (1, 5, "3", "row 2: end.tired: needed an empty cell in this row, got '3'"),
-        (4, 3, "2", "row 5: grade: needed of presentations, got '2'"),
+        (4, 3, "2", "row 5: grade: needed only in rows of presentations, got '2'"),
         (4, 5, "101", "row 5: end.tired: needed a number, 0 to 100, got '101' (NA: was "
          "left out)"),
     ],

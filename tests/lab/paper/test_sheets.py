@@ -113,7 +113,7 @@ def test_all_that_a_rater_must_know_is_printed(new_study: New) -> None:
     ):
         assert words in page
     assert page.count("Break of 7.5 min") == 1  # none after the last
-    assert not [words for words in ("HM3", "says done") if words in page]
+    assert not [words for words in ("HM3", "then press Enter") if words in page]
     # practice comes first, no rating comes of it, and none is typed
     places = [page.index(code) for code in (">P1<", ">P2<", f">{codes(study)[0]}<")]
     assert places == sorted(places)

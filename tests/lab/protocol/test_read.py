@@ -52,7 +52,7 @@ NUMBER = "a number above 0 and at most 180"
             ("models", 0, "parameters"),
             {"stiffness_nm_rad": 1.0},
             "models[0].parameters: needed a kind of model that has some, got "
-            '"spastic-elbow", whose numbers stand beside its id and in constants '
+            '"spastic-elbow", whose numbers are beside its id and in constants '
             '(id "HM1")',
         ),
         # types: a boolean is no number, a number no text, a table no array

@@ -102,7 +102,7 @@ def test_a_stop_and_a_fault_end_with_1_and_a_wrong_rater_with_2(
     failed = masrel("run", fast, "--rater", "R1", *options)
     wrong = masrel("run", fast, "--rater", "R9", *options)
     assert (stopped.code, failed.code, wrong.code) == (1, 1, 2)
-    assert "the same command goes on there" in stopped.err
+    assert "the same command resumes it there" in stopped.err
     assert "was stopped by a fault: speed" in failed.err
     assert failed.out == ""
 

@@ -77,7 +77,7 @@ def wait_for_presentation(study: StudyPaths) -> None:
 ONE = FREE.partition("[presentation]")[0]
 CUED = FREE.replace('"free"', '["slow", "fast"]\nslow_speed_deg_s = 40.0')
 FAST = "Stretch 2: fast, at least 120 deg/s (V3)"
-ASKED = "Stretch the arm as often as you want, then Enter says done"
+ASKED = "Stretch the arm as often as you want, then press Enter"
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_enter_says_done_and_every_other_key_is_an_emergency_stop(
     speed = 30.0 if device == FREE else 60.0  # deg/s
     study, _ = small_study(tmp_path / "study", speed, device=device)
     with closing(Terminal(study)) as terminal:
-        assert asked in terminal.read_until("stop to stop")
+        assert asked in terminal.read_until("or type stop")
         terminal.type(typed)
         for words in shown:
             terminal.read_until(words)

@@ -157,7 +157,8 @@ def test_the_console_says_what_is_practice_and_what_a_break(new_study: New) -> N
     grades, shown = console("\n" + "\n2\n" * 4 + "what\n\n" + "\n2\n")
     run(study, protocol, grades=grades)
     text = shown.getvalue()
-    assert text.startswith("Hold the wrist.\nEnter to go on, stop to stop: PRACTICE, ")
+    first = "Hold the wrist.\nPress Enter to continue, or type stop: PRACTICE, "
+    assert text.startswith(first)
     assert "PRACTICE, no rating of the study. Presentation 2 of 2, code P2. " in text
     assert text.count("PRACTICE") == 2
     assert text.count("A break of 3 minutes. Enter after it to go on") == 2
@@ -376,7 +377,7 @@ def test_an_answer_is_corrected_by_the_command(new_study: New) -> None:
     study.answers_file.write_text(text.replace(",9,", ",8,"), encoding="utf-8")
     (finding,) = verify_study(study).findings
     assert "answers.csv" in str(finding.path)
-    assert finding.message.endswith("masrel ratings writes it anew")
+    assert finding.message.endswith("masrel ratings writes it again")
 
 
 def test_what_is_no_source_of_grades_is_refused_before_anything_happens(

@@ -96,7 +96,7 @@ def test_a_changed_protocol_is_refused_and_nothing_is_written(
         write_schedules(protocol_of(seed=2, raters=("R1", "R2", "R3")), study)
     assert str(caught.value) == (
         f"{study.protocol}: schedule.seed was 1 and is 2 since the draw: 2 of 3 "
-        "schedules are stale; --redraw draws those anew whose sessions have not begun"
+        "schedules are stale; --redraw draws again those whose sessions have not begun"
     )
     assert contents(study) == before
 

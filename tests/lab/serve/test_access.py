@@ -222,7 +222,7 @@ def test_other_methods_and_bodies_are_refused_in_a_sentence(site: Site) -> None:
     for body in (b"", b"[]", b"3", b"{", b'{"a":NaN}', b'{"a":"\\ud800"}'):
         answer = browser.post("/rater/answer", body)
         assert answer.status_code == 400
-        assert answer.json() == {"why": "What is sent needs to be an object in JSON."}
+        assert answer.json() == {"why": "The request must be a JSON object."}
     answer = site.browser().get("/rater")  # which a person reads
     assert answer.status_code == 401
     assert answer.headers["content-type"].startswith("text/html")

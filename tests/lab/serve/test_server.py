@@ -326,7 +326,7 @@ def test_the_command_serves_a_study_once_says_what_is_risked_and_ends_at_a_signa
         assert len(set(re.findall(r"token=([\w-]{22})", server.text))) == 4
         done = masrel("serve", study, "--port", server.port)
         assert done.code == 2
-        assert "needed a study that nobody serves, got one that another" in done.err
+        assert "needed a study that is not being served, got one" in done.err
         with socket.create_connection(("127.0.0.1", server.port)) as connection:
             connection.sendall(b"GET /rater HTTP/1.1\r\n")  # and no more
             assert server.end() == 0

@@ -53,7 +53,7 @@ const screenWords = {
   fault: "is told that a check stopped",
   question: "answers a question",
   break: "has a break",
-  anew: "is asked whether the session begins anew",
+  anew: "is asked whether the session begins again",
 };
 
 function nowWords(desk) {
