@@ -64,14 +64,17 @@ def take_off(study: StudyPaths, rater: str) -> Protocol:
 
 
 FAULTS: dict[str, tuple[Callable[[StudyPaths], object], str]] = {
-    "taken off": (lambda s: take_off(s, "R2"), "sessions/test_R2.jsonl is of no rater"),
+    "taken off": (
+        lambda s: take_off(s, "R2"),
+        "sessions/test_R2.jsonl belongs to no rater",
+    ),
     "emptied": (
         lambda s: s.log_file("R2", "test").write_bytes(b""),
         "sessions/test_R2.jsonl is empty",
     ),
     "deleted": (
         lambda s: s.log_file("R2", "test").unlink(),
-        "sessions/test_R2 has recordings and there is no log",
+        "sessions/test_R2 has recordings but no log",
     ),
     "withdrawn": (
         lambda s: record_standing(

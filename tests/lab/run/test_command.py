@@ -121,7 +121,7 @@ def test_a_person_skips_what_faults_and_the_session_becomes_complete(
 ) -> None:
     study, protocol = faulty
     said = by_console(faulty, "\nskip\nskip too fast\n" + "\nSKIP again\n" * 2)
-    assert "To skip it needs a reason" in said
+    assert "Skipping needs a reason" in said
     log = read_log(study.log_file("R1", "test"))
     assert [event.kind for event in log[1:]] == [
         *["presented", "fault", "skipped"] * 3,

@@ -161,7 +161,7 @@ def test_the_console_says_what_is_practice_and_what_a_break(new_study: New) -> N
     assert text.startswith(first)
     assert "PRACTICE, no rating of the study. Presentation 2 of 2, code P2. " in text
     assert text.count("PRACTICE") == 2
-    assert text.count("A break of 3 minutes. Enter after it to go on") == 2
+    assert text.count("A break of 3 minutes. Then press Enter to continue") == 2
     assert "HM" not in text
 
 

@@ -153,7 +153,7 @@ def test_what_names_models_is_its_owners_alone(tmp_path: Path) -> None:
     assert concealment_notes(protocol_of(), study) == ()
     study.schedules.chmod(0o755)
     (note,) = concealment_notes(protocol_of(), study)
-    assert "other users of this computer may read" in note
+    assert "other users of this computer can read" in note
 
 
 def test_a_published_secret_conceals_nothing_and_draws_the_same(
@@ -163,7 +163,7 @@ def test_a_published_secret_conceals_nothing_and_draws_the_same(
     write_schedules(protocol, study)
     study.published_secret_file.write_bytes(study.secret_file.read_bytes())
     (note,) = concealment_notes(protocol, study)
-    assert "conceal nothing" in note
+    assert "concealed no longer" in note
     assert schedule_problems(protocol, study) == ()
 
 
