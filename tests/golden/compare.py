@@ -256,7 +256,9 @@ def _bar(place: _Place, size: float) -> float:
     if place.kind == "standard_error":
         chance = place.around.get("chance")
         near_one = isinstance(chance, float) and 1.0 - chance < 1e-6
-        return (1e-9 if near_one else 1e-12) * size
+        # a fitted inertia is nearly collinear with what else is fitted
+        is_loose = near_one or place.group == "fit"
+        return (1e-9 if is_loose else 1e-12) * size
     return 1e-9 * (max(size, 1e-3) if place.kind == "interval end" else size)
 
 

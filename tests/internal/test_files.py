@@ -59,10 +59,10 @@ def test_no_output_is_written_over_or_among_primary_records(
 ) -> None:
     root = study(tmp_path / "study")
     before = sorted(root.rglob("*"))
-    with pytest.raises(ParameterError, match="no primary record"):
+    with pytest.raises(ParameterError, match="is a primary record"):
         write_file(root / record, "x")
     with (
-        pytest.raises(ParameterError, match="no primary record"),
+        pytest.raises(ParameterError, match="is a primary record"),
         new_file(root / record),
     ):
         pass
@@ -74,7 +74,7 @@ def test_nothing_but_files_is_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "to_null").symlink_to("/dev/null")
     for target in (tmp_path, tmp_path / "pipe", tmp_path / "to_null"):
-        with pytest.raises(OSError, match="needs to be a file") as raised:
+        with pytest.raises(OSError, match="needed a file or a new name") as raised:
             write_file(target, "x")
         assert raised.value.filename == str(target)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["pipe", "to_null"]

@@ -39,7 +39,7 @@ def test_no_primary_record_is_written_over(
     before = contents(study)
     done = masrel(verb, study, option, study / target)
     assert done.code == 2
-    assert "needs a file that is no primary record" in done.err
+    assert "needed another file, because this is a primary record" in done.err
     assert len(done.err.splitlines()) == 1
     assert contents(study) == before
 

@@ -139,7 +139,7 @@ def test_a_figure_explains_its_phases_where_one_catches(tmp_path: Path) -> None:
             ["--interpolation", "linear"],
             "--interpolation: goes with --motion recording",
         ),
-        (["--view", "time"], "--view: goes with --figure"),
+        (["--view", "time"], "--view: needs --figure"),
         (["--rate-hz", "nan"], "--rate-hz: needs a finite rate, got nan"),
         (["--rate-hz", 1e12], "--csv: needs at most 5000000 samples, got 1.261e+12"),
         (["--at-deg", "nan"], "--at-deg: need ones that the motion reaches, got nan"),

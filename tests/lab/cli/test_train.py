@@ -82,7 +82,7 @@ def test_a_simulated_trainee_learns_passes_and_is_reported(
     assert done.code in (0, None)
     assert "training of R1: passed after" in done.out
     assert "(simulated)" in done.out
-    assert "Nothing of a training enters the ratings" in done.out
+    assert "Trainings never enter the ratings" in done.out
     figure, file = tmp_path / "curve.svg", tmp_path / "training.json"
     report = ["train", "show", trained, "--rater", "R1"]
     shown = masrel(*report, "--figure", figure, "--json", file)

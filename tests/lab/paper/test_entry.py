@@ -238,7 +238,7 @@ def test_another_sheet_is_refused_with_whose_it_is(
     rows = filled(other, "1", "2", "3")
     assert refusal(small, rows).endswith(
         f"got {rows[1][0]}, a sheet of another study or of a schedule that was drawn "
-        "anew"
+        "again"
     )
 
 

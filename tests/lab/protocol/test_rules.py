@@ -201,7 +201,7 @@ JUDGE: dict[str, Any] = {
 JUDGES = [
     ({"humans": ["R1"]}, "judges[0].humans: needed two raters of the session or more"),
     ({"humans": ["R1", "R3"]}, "judges[0].humans: needed two raters of the session"),
-    ({"id": "kappa"}, 'judges[0].id: "kappa" is an estimate of'),
+    ({"id": "kappa"}, 'judges[0].id: "kappa" is also an estimate of'),
     ({"judge": "R4"}, "judges[0].judge: needed a rater of the session (R1, R2, R3)"),
     ({"session": "pre", "humans": ["R1", "R2"]}, "judges[0].session: needed a session"),
     ({"min_items": 3}, "judges[0].min_items: needed at most 2"),

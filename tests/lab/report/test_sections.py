@@ -160,7 +160,7 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
         ), table_v(),
         ["Q: decrease after the peak of the catch", "| θ_rest |",
          "| reading of Q | decrease after the peak over the rise |",
-         "but for those in the table below",
+         "except those in the table below",
          "after the catch | additive: to the torque of pre-catch |",
          "| HM2 | ΔT_rise |"],
     ),

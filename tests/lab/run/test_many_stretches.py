@@ -141,7 +141,10 @@ def test_what_was_too_slow_is_said_to_the_rater_counted_and_graded_all_the_same(
     small = new_study(settings, rules)
     source, said = console("\n1\n\nagain\n\n2\n\n3\n")
     run(small, source)
-    assert said.getvalue().count("too slow to feel the catch: once more?") == 4
+    assert (
+        said.getvalue().count("too slow to feel the catch. To repeat it, type again.")
+        == 4
+    )
     assert {event.fields["felt"] for event in shown(small)} == {"below-threshold"}
     assert ratings_from_logs(*small).table["felt"].tolist() == ["below-threshold"] * 3
     page = small[0].root / "report" / "report.md"
@@ -176,7 +179,7 @@ def test_a_grip_that_was_lost_stands_in_the_table_and_the_report(
     run(small, source)
     lost = [event.fields["grip_lost"] for event in shown(small)]
     assert True in lost
-    assert said.getvalue().count("came loose, and the model let go") == sum(lost)
+    assert said.getvalue().count("came loose and the model let go") == sum(lost)
     ratings = ratings_from_logs(*small)
     assert [row.grip_lost for row in ratings.rows] == lost
     root = small[0].root

@@ -142,7 +142,7 @@ def test_a_person_asks_what_grades_mean_feels_it_again_and_types_wrongly(
         "  1+  tone slightly up: a catch, then",
         "Phys Ther 1987",
         "'1 +' is not a grade: needed one of 0, 1, 1+, 2, 3, 4.",
-        "again. Enter to begin",
+        "again. Press Enter to begin",
     ):
         assert words in text
     assert text.count("is not a grade") == 2

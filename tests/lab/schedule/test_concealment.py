@@ -193,7 +193,7 @@ def test_a_lost_secret_loses_only_the_second_draw(tmp_path: Path) -> None:
     assert read_schedule(study.schedule_file("R1", "test")) == before
     assert schedule_problems(protocol_of(), study) == ()
     (note,) = concealment_notes(protocol_of(), study)
-    assert "1 of 2 schedules are of a secret that is not in the study" in note
+    assert "1 of 2 schedules were drawn from a secret that is not in the study" in note
 
 
 @pytest.mark.parametrize("text", ["", "format: 2\nsecret: 00\n", "secret: " + "0" * 32])

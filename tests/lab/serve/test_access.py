@@ -74,7 +74,7 @@ def test_an_address_lets_in_once_and_the_browser_it_let_in_again(site: Site) -> 
     address = site.access.new_address("rater")
     answer = restarted(site, site.browser()).get(address)
     assert answer.status_code == 401
-    assert "not one of this study now" in answer.text
+    assert "This address is no longer valid" in answer.text
 
 
 def test_the_oldest_of_many_addresses_lapses_and_no_other_token_lets_in(

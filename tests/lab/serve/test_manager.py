@@ -115,7 +115,7 @@ def test_one_session_runs_at_a_time_and_no_unknown_one(study: StudyPaths) -> Non
         both = (manager.start("R1", "test"), manager.start("R2", "test"))
         results = await asyncio.gather(*both, return_exceptions=True)
         assert [type(result) for result in results] == [type(None), ParameterError]
-        with pytest.raises(ParameterError, match="needed none that runs"):
+        with pytest.raises(ParameterError, match="needed no other session running"):
             await manager.start("R2", "test")
 
     at(study, act)

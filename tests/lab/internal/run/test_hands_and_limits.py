@@ -204,7 +204,7 @@ def test_what_a_motor_does_in_silence_is_said(small: Small) -> None:
         [*device_notes(protocol, small[0])] for protocol in (of_puck, small[1])
     )
     assert never == 'device.backend: "puck" was never calibrated for this study'
-    assert note.startswith('device.backend: "puck" goes on with its last torque')
+    assert note.startswith('device.backend: "puck" keeps its last torque')
     assert not [note for note in usual if "backend" in note]
 
 

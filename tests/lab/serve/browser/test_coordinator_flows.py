@@ -69,7 +69,7 @@ def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twic
     status, body = second.post(
         "/coordinator/start", rater="R60", session="test", rehearsal=False
     )
-    assert (status, "needed none that runs" in body["why"]) == (422, True)
+    assert (status, "needed no other session running" in body["why"]) == (422, True)
     said = form(second.page, NOTE, text="Seen by two", who="AB")
     expect(said).to_contain_text("Recorded")
     sees(coordinator, "Seen by two", "#events")
