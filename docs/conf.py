@@ -36,6 +36,7 @@ version = release = masrel.__version__
 root_doc = "index"
 extensions = [
     "myst_parser",
+    "notfound.extension",
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
@@ -95,6 +96,12 @@ if _HAS_ADDRESS:
     html_context |= {"github_user": _USER, "github_repo": _REPOSITORY}
     html_context |= {"github_version": "main"}
 copybutton_prompt_text = "$ "
+notfound_context = {
+    "title": "Page not found",
+    "body": "<h1>Page not found</h1>\n<p>The page was moved or never existed. Search "
+    "for it above, or begin with one of the two doors: I have ratings, or I run a "
+    "study.</p>",
+}
 copybutton_exclude = ".linenos, .gp, .go"
 
 # Files beside this folder, and the pages that show them
