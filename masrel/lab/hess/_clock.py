@@ -148,7 +148,7 @@ def real_time() -> Iterator[str]:
     # Only Linux has all three; elsewhere nothing is requested. The process may ask for
     # SCHED_FIFO and locked memory as root, or within ``ulimit -r`` and ``ulimit -l``.
     if sys.platform != "linux":
-        yield f"ordinary scheduling: none better is known on {sys.platform}"
+        yield f"ordinary scheduling: no other is available on {sys.platform}"
         return
     library = ctypes.CDLL(None, use_errno=True)
     with ExitStack() as back:

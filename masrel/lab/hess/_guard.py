@@ -137,8 +137,8 @@ class Guard:
         if not -limits.jump_angle <= deviation / ticks <= limits.jump_angle:
             raise LimitExceededError(
                 f"jump: needs an angle within {math.degrees(limits.jump_angle):g} deg "
-                f"of where the speed would have it, got one "
-                f"{math.degrees(deviation / ticks):.2f} deg a tick from there",
+                f"of the one that the speed predicts, got "
+                f"{math.degrees(deviation / ticks):.2f} deg a tick from it",
                 "jump",
             )
         if self._drift is not None and not self._drift.goes_on(
@@ -158,9 +158,9 @@ class Guard:
             self._drift = Drift(limits, self._angle)
         if self._stopped_dead and duration_s > limits.frozen_time:
             raise LimitExceededError(
-                f"frozen: needs an angle that changes within "
-                f"{limits.frozen_time * 1e3:g} ms of an arm that was moving, "
-                f"got one that does not for {duration_s * 1e3:.1f} ms",
+                f"frozen: needs a change of angle within "
+                f"{limits.frozen_time * 1e3:g} ms while the arm moves, "
+                f"got none for {duration_s * 1e3:.1f} ms",
                 "frozen",
             )
         if duration_s > limits.standing_time and not (
@@ -232,9 +232,9 @@ class Guard:
         limit = self._limits.standing_torque
         if not -limit <= torque <= limit:
             raise LimitExceededError(
-                f"start: needs at most {limit:g} N·m in the first tick, an arm at "
-                f"{math.degrees(self._angle):.1f} deg asks for {torque:.3f} N·m; bring "
-                "it to where the stretch starts",
+                f"start: needs at most {limit:g} N·m in the first tick, but at "
+                f"{math.degrees(self._angle):.1f} deg the model asks for {torque:.3f} "
+                "N·m; move the arm to the start of the stretch",
                 "start",
             )
 
@@ -252,9 +252,8 @@ class Guard:
         self._n_in_a_row += 1
         if self._n_in_a_row > limits.missed_replies:
             raise LimitExceededError(
-                f"missed replies: needs a new reading after at most "
-                f"{limits.missed_replies} ticks without, got {self._n_in_a_row} "
-                f"in a row ({reason})",
+                f"missed replies: needs at most {limits.missed_replies} ticks in a row "
+                f"without a new reading, got {self._n_in_a_row} ({reason})",
                 "missed-replies",
             )
         times = self._without
@@ -340,7 +339,7 @@ class ActuatorGuard:
         elif time_s - self._within_s > _ACTUATOR_S:
             raise LimitExceededError(
                 f"actuator: needs a torque within {self._limit:g} N·m of the one that "
-                f"is sent, got {self._residual:+.2f} N·m besides for "
+                f"was sent, got a difference of {self._residual:+.2f} N·m for "
                 f"{_ACTUATOR_S * 1e3:g} ms",
                 "actuator",
             )
@@ -380,8 +379,8 @@ class Drift:
             return 0.5 * self._speed < speed < 1.5 * self._speed
         if speed < limits.drift_speed:
             raise LimitExceededError(
-                f"drift: needs an arm that starts from rest, got an encoder that was "
-                f"at {math.degrees(speed):.1f} deg/s at once and has gone "
+                f"drift: needs an arm that starts from rest, got an encoder that "
+                f"read {math.degrees(speed):.1f} deg/s at once and moved by "
                 f"{math.degrees(moved):.1f} deg",
                 "drift",
             )
@@ -420,22 +419,22 @@ class ActiveGuard:
         self.energy_given -= self._held * (angle - self._angle)
         if self.energy_given > limits.active_energy:
             raise LimitExceededError(
-                f"energy: needs a model that has given the arm at most "
-                f"{limits.active_energy:g} J more than it took, got "
+                f"energy: needs a model that gives the arm at most "
+                f"{limits.active_energy:g} J more than it takes, got "
                 f"{self.energy_given:.3f} J",
                 "energy",
             )
         if not -limits.active_torque <= torque <= limits.active_torque:
             raise LimitExceededError(
-                f"active torque: needs at most {limits.active_torque:g} N·m of a model "
-                f"that is not passive, got {torque:.3f} N·m",
+                f"active torque: needs at most {limits.active_torque:g} N·m from a "
+                f"model that is not passive, got {torque:.3f} N·m",
                 "active-torque",
             )
         if torque * velocity < 0.0 and abs(velocity) > limits.active_speed:
             raise LimitExceededError(
-                f"slip: needs an arm that moves at most "
-                f"{math.degrees(limits.active_speed):.0f} deg/s the way a model pushes "
-                f"it that is not passive, got {math.degrees(velocity):.0f} deg/s",
+                f"slip: needs at most {math.degrees(limits.active_speed):.0f} deg/s in "
+                "the direction in which a model that is not passive pushes, got "
+                f"{math.degrees(velocity):.0f} deg/s",
                 "slip",
             )
         self._angle = angle

@@ -91,7 +91,7 @@ THRICE = {"stretches": StretchRules(n=3), "max_duration_s": None}
 STOPPED = {
     "energy": (
         *(even, helping, {}, "energy", 1.0 / (0.8 * SPEED**2) + 1 / 180, -0.8 * SPEED),
-        "energy: needs a model that has given the arm at most 1 J more than it took, "
+        "energy: needs a model that gives the arm at most 1 J more than it takes, "
         "got 1.00",
     ),
     "more than it took": (
@@ -104,7 +104,7 @@ STOPPED = {
     ),
     "torque": (
         *(even, lambda t, _a, _v: 1.5 + 20.0 * t, {}, "active-torque", 0.426, 10.0),
-        "active torque: needs at most 10 N·m of a model that is not passive, got "
+        "active torque: needs at most 10 N·m from a model that is not passive, got "
         "10.020 N·m",
     ),
     "no number": (
@@ -200,8 +200,8 @@ def test_an_arm_that_is_thrown_the_way_it_is_pushed_is_a_lost_grip() -> None:
     assert fault is not None
     assert fault.kind == "slip"
     assert fault.message.startswith(
-        "slip: needs an arm that moves at most 180 deg/s the way a model pushes it "
-        "that is not passive, got -18"
+        "slip: needs at most 180 deg/s in the direction in which a model that is not "
+        "passive pushes, got -18"
     )
     # By hand, without friction: from 149 deg/s to -180 at 1.5/0.0597 = 25.1 rad/s²
     # takes 0.229 s, and the speed comes 5.6 ms late.

@@ -141,7 +141,7 @@ ROWS = {
         {},
         "start",
         0,
-        "arm at 57.3 deg asks for 2.0",
+        "at 57.3 deg the model asks for 2.0",
     ),
     "so much towards extension": (
         REST,
@@ -211,7 +211,7 @@ ROWS = {
         {},
         "jump",
         20,
-        "within 0.3 deg of where .* one 0.35 deg",
+        "within 0.3 deg of the one .* got 0.35 deg",
     ),
     "-0.35 deg": (
         jumping(-0.35),
@@ -219,7 +219,7 @@ ROWS = {
         {},
         "jump",
         20,
-        "-0.35 deg a tick from there",
+        "-0.35 deg a tick from it",
     ),
     "0.35 deg at rest": (
         at(5 * MS, 1.5, 1.5 + radians(0.35)),
@@ -236,7 +236,7 @@ ROWS = {
         {},
         "frozen",
         30,
-        r"within 10 ms .* not for 10\.0 ms",
+        r"within 10 ms .* none for 10\.0 ms",
     ),
     "for 9 ms": (lambda t: STOPPED(t) + STEP * (t > 0.0285), NOTHING, {}, None, 0, ""),
     "from 15 deg/s": (ticks((20, 15.0), (1, 0.0)), NOTHING, {}, None, 0, ""),
@@ -334,7 +334,7 @@ def test_a_gap_widens_what_may_follow(moved_deg: float, is_a_jump: bool) -> None
     assert (fault is not None) is is_a_jump
     if fault is not None:
         assert fault.kind == "jump"
-        assert re.search(r"got one 0\.3\d deg a tick from there", fault.message)
+        assert re.search(r"got 0\.3\d deg a tick from it", fault.message)
 
 
 @pytest.mark.parametrize(
@@ -358,7 +358,11 @@ def test_a_reading_that_is_too_old_or_from_the_future_is_named(
     ("is_lost", "tick", "words"),
     [
         (lambda tick: 4 <= tick % 10 <= 5 and tick < 50, None, ""),
-        (lambda tick: 4 <= tick <= 6, 6, r"at most 2 ticks without, got 3 in a row \("),
+        (
+            lambda tick: 4 <= tick <= 6,
+            6,
+            r"at most 2 ticks in a row without a new reading, got 3 \(",
+        ),
         # Every ninth from 0 on: 0, 9, ..., 90 are eleven of the ticks 0 to 99. Every
         # tenth are ten of any hundred, for ever.
         (lambda tick: tick % 2 == 0, 20, "at most 10 of 100 ticks without"),
@@ -481,7 +485,7 @@ def test_a_resting_arm_that_creeps_is_a_fault_below_half_a_newton_metre(
     assert shown.fault is not None
     assert shown.fault.kind == "drift"
     assert shown.fault.message.startswith(
-        "drift: needs an arm that starts from rest, got an encoder that was at "
+        "drift: needs an arm that starts from rest, got an encoder that read "
     )
     assert shown.fault.time_s == pytest.approx(start_s + 3.0 / abs(rate), abs=0.005)
     assert np.abs(shown.recording.columns["command_torque_nm"]).max() < 0.5

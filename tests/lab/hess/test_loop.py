@@ -218,7 +218,7 @@ def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
 
 
 SILENT = (
-    "missed replies: needs a new reading after at most 2 ticks without, got 3 in a row "
+    "missed replies: needs at most 2 ticks in a row without a new reading, got 3 "
     "(scripted: no answer)"
 )
 DEAF = "scripted: does not listen"

@@ -153,7 +153,7 @@ class Servo(Node):
         self._wait_until(self._is_current, deadline_ns, "no answer")
         answer, self._answer = self._answer, {}
         if math.isnan(answer[POSITION]):
-            raise FrameError(f"{self.name}: its position is no number")
+            raise FrameError(f"{self.name}: its position is not a number")
         self._accepted = self.asked_ns, int(answer[COUNTER])
         return State(
             min(self.asked_ns + _SAMPLING_NS, self.clock.now_ns()),
@@ -238,7 +238,7 @@ class Servo(Node):
         for act, kind, first, number, values, text in decode(frame.data):
             if act in (WRITE_ERROR, READ_ERROR):
                 raise DeviceError(
-                    f"{self.name}: does not let register {first:#05x} be "
+                    f"{self.name}: does not allow register {first:#05x} to be "
                     f"{'written' if act == WRITE_ERROR else 'read'} (error {number})"
                 )
             if first == COUNTER and kind != self._counter_kind:
@@ -342,8 +342,8 @@ class MoteusDevice(CanDevice[MoteusOptions]):
 
     def _timed_out(self) -> IdledError:
         return IdledError(
-            f"{self._servo.name}: heard nothing for {self._options.watchdog_ms:g} ms "
-            "and has let the arm go",
+            f"{self._servo.name}: received nothing for {self._options.watchdog_ms:g} "
+            "ms and let the arm go",
             "watchdog",
         )
 
@@ -361,13 +361,13 @@ class MoteusDevice(CanDevice[MoteusOptions]):
             expected = (STOPPED, *PREPARING, DRIVEN)
         if mode not in expected:
             raise IdledError(
-                f"{servo.name}: needs mode {expected[-1]}, somebody else has set it to "
-                f"{mode}"
+                f"{servo.name}: needs mode {expected[-1]}, but another program set it "
+                f"to {mode}"
             )
         self._n_limited = self._n_limited + 1 if state.code in LIMITS else 0
         if self._n_limited > _MAX_LIMITED:
             raise LimitExceededError(
-                f"{servo.name}: gives less torque than it was told, code {state.code}: "
+                f"{servo.name}: gives less torque than it was sent, code {state.code}: "
                 f"{LIMITS[state.code]}",
                 "limited",
             )
@@ -380,8 +380,8 @@ class MoteusDevice(CanDevice[MoteusOptions]):
         if self._n_off > _MAX_OFF:
             raise BusError(
                 f"{self._servo.name}: needs a torque of {self._commanded[-1]:.2f} N·m, "
-                f"gives {torque:.2f}, {self._n_off} times in a row: torques get lost, "
-                "or no current flows",
+                f"gives {torque:.2f}, {self._n_off} times in a row: commands get "
+                "lost, or no current flows",
                 "lost-torques",
             )
 

@@ -274,8 +274,8 @@ class AwakePuck:
         self._set("T", 0)
         if torque != 1:  # then lost torques could not be noticed
             raise DeviceError(
-                f"puck {node.puck}: needs a T that reads back what it was set to, set "
-                f"to 1 it reads {torque}; checks_torque = false goes without"
+                f"puck {node.puck}: needs a property T that reads back as it was set, "
+                f"set to 1 it reads {torque}; checks_torque = false skips this check"
             )
 
     def release(self) -> None:
@@ -411,7 +411,7 @@ class PuckDevice(CanDevice[PuckOptions]):
     def _check_answers(self) -> None:
         if self._n_unanswered > _MAX_UNANSWERED:
             raise DeviceTimeoutError(
-                f"puck {self._node.puck}: has not said its mode or torque "
+                f"puck {self._node.puck}: did not report its mode or torque "
                 f"{self._n_unanswered} times in a row"
             )
 
@@ -419,8 +419,8 @@ class PuckDevice(CanDevice[PuckOptions]):
         self._n_unanswered = 0
         if mode != TORQUE:
             raise IdledError(
-                f"puck {self._node.puck}: needs MODE {TORQUE}, somebody else "
-                f"has set it to {mode}; an emergency stop, or a pendant?"
+                f"puck {self._node.puck}: needs MODE {TORQUE}, but "
+                f"something else set it to {mode}: an emergency stop, or a pendant?"
             )
 
     def _check_torque(self, units: int) -> None:
@@ -428,9 +428,9 @@ class PuckDevice(CanDevice[PuckOptions]):
         self._n_lost = 0 if units == self._asked_units else self._n_lost + 1
         if self._n_lost > _MAX_LOST_TORQUES:
             raise BusError(
-                f"puck {self._node.puck}: needs the torque it was told, "
+                f"puck {self._node.puck}: needs the torque it was sent, "
                 f"{self._asked_units} current units, holds {units}, "
-                f"{self._n_lost} times in a row: torques get lost",
+                f"{self._n_lost} times in a row: commands get lost",
                 "lost-torques",
             )
 

@@ -96,7 +96,7 @@ def test_after_silence_without_torque_it_is_stopped_and_started_anew() -> None:
         assert degrees(device.read().angle) == pytest.approx(60.0, abs=1.0)
         device.command(1.0)
         wait(clock, 0.1)
-        with pytest.raises(IdledError, match="heard nothing for 20 ms") as caught:
+        with pytest.raises(IdledError, match="received nothing for 20 ms") as caught:
             device.read()
     assert caught.value.kind == "watchdog"
 

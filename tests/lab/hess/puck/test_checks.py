@@ -62,7 +62,13 @@ def checked(hand: Hand | None = None, n: int = 1, **emulator) -> dict[str, Check
         ),
         ("error-frames", 0.02, {"every": 400}, ["error frames"], "3, and 0 frames of"),
         ("unplugged", 0.02, {"end_s": 1.0}, ["answers"], " of 1000 lost"),
-        ("dropped-torques", 0.0, {}, ["torque mode"], "needs a T that reads back"),
+        (
+            "dropped-torques",
+            0.0,
+            {},
+            ["torque mode"],
+            "needs a property T that reads back",
+        ),
         ("idled", 0.0, {}, ["torque mode"], "is an emergency stop pressed"),
     ],
 )
@@ -203,15 +209,15 @@ def turned(device: Device, clock: SimulatedClock, ends: str, **options) -> Devic
     [
         (
             fault("frozen-encoder", 0.9),
-            "frozen: needs an angle that changes w",
+            "frozen: needs a change of angle within 10",
             "frozen",
         ),
         (fault("jumping-encoder", 0.9), "jump: needs an angle within 0.3 deg", "jump"),
-        (fault("idled", 0.9), "needs MODE 2, somebody else has set it to 0", "idled"),
+        (fault("idled", 0.9), "needs MODE 2, but something else set it to 0", "idled"),
         # As in a presentation: three in a row, and every fourth of a hundred
         (
             fault("dropped-replies", 0.6, end_s=0.61),
-            r"needs a new reading after at most 2 ticks .*no position within 1 ms",
+            r"needs at most 2 ticks in a row .*no position within 1 ms",
             "missed-replies",
         ),
         (
@@ -240,7 +246,7 @@ def test_two_lost_readings_in_a_row_are_let_pass_and_one_that_comes_again_is_non
         assert len(steady_runs(device, clock, speeds=TWO)) == 4
     clock = SimulatedClock()
     with simulated(clock, read_fault=repeated(0.5)) as device:
-        error = turned(device, clock, r"3 in a row \(one of 0.499000 s again")
+        error = turned(device, clock, r"got 3 \(one of 0.499000 s again")
     assert isinstance(error, LimitExceededError)
 
 

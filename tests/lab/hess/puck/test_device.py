@@ -118,7 +118,7 @@ def test_a_driver_that_was_killed_leaves_no_torque_to_the_next() -> None:
         (
             {"faults": (fault("dropped-torques", 0.0),)},
             {},
-            r"needs a T that reads back .* reads 0",
+            r"needs a property T that reads back .* reads 0",
         ),
     ],
 )
@@ -296,7 +296,7 @@ def test_a_mode_that_was_changed_is_noticed_when_checked() -> None:
     with device:
         device.check()
         wait(clock, 0.1)
-        with pytest.raises(IdledError, match="somebody else has set it to 0"):
+        with pytest.raises(IdledError, match="something else set it to 0"):
             device.check()
 
 
