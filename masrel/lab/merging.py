@@ -57,8 +57,8 @@ def merge_studies(studies: Sequence[StudyPaths], destination: Path) -> StudyPath
     -------
     StudyPaths
         The new folder: all raters, schedules, sheets that were typed, logs and
-        recordings of sessions, trainings and rehearsals, and logs of conduct, byte for
-        byte. No secret is copied, nor what was made of the logs.
+        recordings of sessions, trainings and rehearsals, calibrations, and logs of
+        conduct, byte for byte. No secret is copied, nor what was made of the logs.
 
     Raises
     ------
@@ -238,7 +238,9 @@ def _files(
             study.in_person_file,
         )
         of_study = [
-            *_inside(study.schedules, study.sessions, study.training),
+            *_inside(
+                study.schedules, study.sessions, study.training, study.calibrations
+            ),
             *(study.root / model.file for model in protocol.models if model.file),
             *(path for path in sorted(study.sheets.glob("*.csv")) if has_answers(path)),
             *(file for file in sources if file.exists()),

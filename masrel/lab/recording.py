@@ -36,6 +36,7 @@ __all__ = [
     "PHASES",
     "RAMPS",
     "RECORDING_COLUMNS",
+    "TORQUE_GAINS",
     "Channel",
     "Phase",
     "Recording",
@@ -128,6 +129,9 @@ MEASURED_TORQUE = Channel(name="measured_torque", unit="nm")
 
 ESTIMATED_TORQUE = Channel(name="estimated_torque", unit="nm")
 """The same, as an amplifier estimates it from its current."""
+
+TORQUE_GAINS = (0.9, 1.1)
+"""How many times the torque that it is sent a device may give, at least and at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,14 +35,11 @@ from masrel.lab.conduct._calibrations import (
     last_calibration,
     write_calibration,
 )
-from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     BackendOptions,
     Clock,
-    Controller,
     Device,
     EmergencyStop,
-    Friction,
     RealClock,
     SimulatedClock,
     SimulatedHand,
@@ -68,7 +65,7 @@ from masrel.lab.hess.device import _BACKENDS as _OWN
 from masrel.lab.hess.device import _GROUP
 from masrel.lab.hess.moteus import MoteusOptions
 from masrel.lab.hess.puck import PuckOptions, read_property_table
-from masrel.lab.protocol import DeviceSettings, Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.protocol.study import _home
 from masrel.lab.recording import MEASURED_TORQUE, Recording
 from masrel.lab.run._settings import (
@@ -76,6 +73,7 @@ from masrel.lab.run._settings import (
     calibrated,
     device_limits,
     has_simulated_hand,
+    model_controller,
     use_calibration,
 )
 
@@ -459,6 +457,11 @@ def _calibrate(
     """
     if mass_kg and radius_m is None:
         raise click.UsageError("--mass-kg: needs --radius-m")
+    if mass_kg and (min(mass_kg) <= 0.0 or len({*mass_kg}) < 2):
+        raise click.UsageError(
+            "--mass-kg: needs two different masses or more, each above 0, got "
+            f"{', '.join(f'{mass:g}' for mass in mass_kg)}"
+        )
     if study is not None:
         paths = StudyPaths(study)
         session = _of_study(session, read_protocol(paths.protocol))
@@ -485,7 +488,7 @@ def _calibrate(
         boards=_boards(session),
         distribution=_distribution(session.name),
         who=who,
-        time_utc=utc_now().isoformat(timespec="seconds"),
+        time_utc=utc_now(),
         simulated=not session.options.moves_hardware,
         gain_from=against if points else None,
         values={**values},
@@ -547,19 +550,24 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
     of the models HM1 to HM4, or a person does, whom the command tells each time. Then
     the loop runs in real time on an arm that is held still.
     """
-    settings, calibration = DeviceSettings(), None
+    hess2012, calibration = StudyPaths(_home() / "hess2012"), None
+    table_v = read_protocol(hess2012.protocol)
     if study is not None:
         paths = StudyPaths(study)
         protocol = read_protocol(paths.protocol)
         session = _of_study(session, protocol)
-        calibration, _ = last_calibration(paths, protocol) or (None, "")
-        settings = calibrated(protocol, calibration).device
+        last = last_calibration(
+            paths, protocol, simulated=not session.options.moves_hardware
+        )
+        calibration = None if last is None else last[0]
+        table_v = msgspec.structs.replace(table_v, device=protocol.device)
+        table_v = calibrated(table_v, calibration)
     if isinstance(session.options, MoteusOptions):
         options = dataclasses.replace(session.options, estimates_torque=True)
         session = dataclasses.replace(session, options=options)
-    present = functools.partial(_presented, session, settings, calibration)
-    table_v = (_home() / "hess2012" / "ratings" / "published.csv").read_text("utf-8")
-    rows, stretches = [*csv.DictReader(table_v.splitlines())], []
+    present = functools.partial(_presented, session, table_v, calibration)
+    published = hess2012.published_file.read_text("utf-8")
+    rows, stretches = [*csv.DictReader(published.splitlines())], []
     with session.progress(len(rows)) as bar:
         for row in rows:
             speed = float(row["mean_speed_deg_s"])
@@ -570,7 +578,7 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
             bar.update()
     n_parts = math.ceil(minutes)
     parts = [present("HM1", still_s=60.0 * minutes / n_parts) for _ in range(n_parts)]
-    late = lateness_ms(parts, settings.rate_hz)
+    late = lateness_ms(parts, table_v.device.rate_hz)
     late_ms = np.percentile(late, (50, 99, 99.9, 100)).tolist()
     n_missed = sum(int(part.facts["n_missed_ticks"] or 0) for part in parts)
     faults = [str(part.facts["fault"]) for part in parts if part.facts["fault"]]
@@ -597,7 +605,7 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
 
 def _presented(
     session: _Session,
-    settings: DeviceSettings,
+    table_v: Protocol,
     calibration: Calibration | None,
     model: str,
     *,
@@ -620,17 +628,7 @@ def _presented(
             f"{speed_deg_s:.0f} deg/s"
         )
     options = session.options.emulated(_START) if hand else session.options
-    friction = Friction(
-        viscous=settings.friction_viscous_nms_rad, coulomb=settings.friction_coulomb_nm
-    )
-    controller = Controller(
-        STANDARD_MODELS[model],
-        start_angle=_START,
-        friction=friction,
-        compensation=settings.friction_compensation,
-        rate_hz=settings.rate_hz,
-    )
-    limits = device_limits(settings)
+    limits = device_limits(table_v.device)
     if still_s is not None:  # what is late is to be counted
         limits = dataclasses.replace(limits, missed_ticks=1_000_000)
     used = dataclasses.replace(session, clock=clock, hand=hand, options=options)
@@ -639,10 +637,10 @@ def _presented(
             use_calibration(device, calibration)
         presented = run_presentation(
             device,
-            controller,
+            model_controller(table_v, model),
             clock=clock,
             limits=limits,
-            rate_hz=settings.rate_hz,
+            rate_hz=table_v.device.rate_hz,
             max_duration_s=still_s,
             end_angle=_RANGE_END,
             **watching,

@@ -44,7 +44,9 @@ def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> 
 
     stands = study_status(paths, protocol)
     stands["device"] = [
-        *calibration_notes(paths, protocol, lambda: moves_hardware(protocol.device))
+        *calibration_notes(
+            paths, protocol, moves_hardware=moves_hardware(protocol.device)
+        )
     ]
     sessions = stands["sessions"]
     problems = (stands["problem"], *(session["problem"] for session in sessions))

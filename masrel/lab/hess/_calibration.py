@@ -28,6 +28,7 @@ from masrel.lab.hess._free_arm import (
 )
 from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
+from masrel.lab.recording import TORQUE_GAINS
 
 _REST_S = 2.0
 
@@ -42,9 +43,6 @@ _N_SMOOTH = 8  # terms of a polynomial of the time: what is slower than the puls
 _CARRIED_SPEED = math.radians(10.0)
 _CARRIED = math.radians(70.0), math.radians(85.0)
 _CARRIED_SETTLING = math.radians(5.0)
-
-GAINS = (0.9, 1.1)
-"""Between which the gain of torque has to be."""
 
 N_STEPS = 2 * len(SPEEDS) + 2 * _N_PULSED
 """How often the free arm is turned."""
@@ -225,9 +223,10 @@ def fit_gain(points: Sequence[GainPoint]) -> dict[str, Measured]:
     (slope, offset, _), (error, offset_error, _) = linear_fit(design, sent)
     share = _measured(slope, error, df)
     gain = Measured(1.0 / slope, 1.0 / share.high, 1.0 / share.low)
-    if not GAINS[0] <= gain.value <= GAINS[1]:
+    least, most = TORQUE_GAINS
+    if not least <= gain.value <= most:
         raise DeviceError(
-            f"gain: needs a torque of {GAINS[0]:g} to {GAINS[1]:g} times the one that "
+            f"gain: needs a torque of {least:g} to {most:g} times the one that "
             f"is sent, got {gain.value:.3f} times ({gain.low:.3f} to {gain.high:.3f}); "
             "correct the motor's torque constant, the gear or the direction"
         )

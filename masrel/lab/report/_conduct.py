@@ -159,7 +159,11 @@ def study_conduct(
         has_published_secret=study.published_secret_file.is_file(),
         is_of_ratings=bool(begun) and file is None,
         sha256=conduct_hash(study),
-        calibration=last_calibration(study, protocol),
+        calibration=last_calibration(
+            study,
+            protocol,
+            simulated=all(s.simulated for s in sessions if s.last_event is not None),
+        ),
         include=frozenset(include),
     )
 
@@ -198,12 +202,12 @@ def _device_calibration(material: Material, conduct: StudyConduct) -> Iterator[C
     if conduct.calibration is not None:
         calibration, _ = conduct.calibration
         yield Paragraph(
-            text=f"{'SIMULATED: ' * calibration.simulated}calibration "
-            f"of the device, {device}, on {calibration.time_utc[:10]}, with intervals "
-            f"of 95 %: {'; '.join(calibration.lines)}. Gain of torque from "
+            text=f"{'SIMULATED: ' * calibration.simulated}calibration of the device, "
+            f"{device}, on {calibration.time_utc:%Y-%m-%d}, with intervals of 95 %: "
+            f"{'; '.join(calibration.lines)}. Gain of torque from "
             f"{calibration.gain_from or 'nothing: it was not measured'}."
         )
-    elif device != "simulated" and any(not s.simulated for s in conduct.begun):
+    elif any(not session.simulated for session in conduct.begun):
         yield Paragraph(text=f"The device, {device}, was never calibrated.")
 
 

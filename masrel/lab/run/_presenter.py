@@ -74,7 +74,9 @@ class Presenter:
         self._occasion = occasion  # what it is for, in messages
         self._named_by = named_by  # fields of a presentation in each of its events
         self._has_schedule = has_schedule  # that says which model it was
-        self._calibration = last_calibration(study, protocol)
+        self._calibration = last_calibration(
+            study, protocol, simulated=not moves_hardware(protocol.device)
+        )
         self._shown: Presentation | None = None  # what is asked about
 
     @property

@@ -109,7 +109,8 @@ def _torque_problems(protocol: Protocol, model: Model) -> Iterator[str]:
 
 def device_notes(protocol: Protocol, study: StudyPaths) -> Iterator[str]:
     """Yield what a device does in silence, what of its calibration, and its limits."""
-    if moves_hardware(settings := protocol.device):
+    settings = protocol.device
+    if is_hardware := moves_hardware(settings):
         setup = DeviceSetup(clock=RealClock(), options=backend_options(settings))
         if build_device(settings.backend, setup).holds_torque_when_silent:
             yield (
@@ -117,7 +118,7 @@ def device_notes(protocol: Protocol, study: StudyPaths) -> Iterator[str]:
                 "nothing more is sent, as after a cable comes off: have an "
                 "emergency switch in the supply of its motor within reach"
             )
-    yield from calibration_notes(study, protocol, lambda: moves_hardware(settings))
+    yield from calibration_notes(study, protocol, moves_hardware=is_hardware)
     yield from _torque_notes(protocol)
 
 

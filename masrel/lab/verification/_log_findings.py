@@ -6,7 +6,7 @@ An anchor is the hash of a log's last line, kept where the study is not.
 import hashlib
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -154,9 +154,11 @@ def recording_findings(
     of: Mapping[str, object],
     event: Event,
     log: Path,
+    calibrations: Collection[str],
 ) -> Iterator[Finding]:
     """Yield what is wrong with the recording that an event of a log names."""
-    # it has to lie beside its log, under its code; of: study, rater and session
+    # it has to lie beside its log, under its code; of: study, rater and session;
+    # calibrations: hashes of those of the study
     attempt = event.fields["attempt"]
     name = code if attempt == 1 else f"{code}-{attempt}"
     if code not in shown or path != log.with_suffix("") / f"{name}.npz":
@@ -196,6 +198,11 @@ def recording_findings(
                 f"{name}: needed {json.dumps(value)}, as {where} and its "
                 f"schedule have it, got {json.dumps(got)}",
             )
+    calibration = facts.get("calibration_sha256")
+    if calibration is not None and calibration not in calibrations:
+        yield broken(
+            path, f"calibration_sha256: no file in calibrations/ has it: {calibration}"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from masrel.errors import ParameterError, ScheduleError
 from masrel.lab._event_log import Event, read_log
 from masrel.lab._study_files import MAX_SMALL, read_regular
+from masrel.lab.conduct._calibrations import calibration_hashes
 from masrel.lab.protocol import Protocol, Question, StudyPaths, presented_hash
 from masrel.lab.protocol._values import checked_answer
 from masrel.lab.run._rehearsal import (
@@ -183,10 +184,11 @@ def _against_schedule(
     findings += _event_findings(protocol, shown, events, log)
     findings += time_findings(events, log)
     of = {name: needed[name] for name in ("study", "rater", "session")}
+    known = calibration_hashes(study)
     for event in state.all_presented:
         code = str(event.fields["code"])
         path = study.sessions / str(event.fields["recording"])
-        findings += recording_findings(path, code, shown, of, event, log)
+        findings += recording_findings(path, code, shown, of, event, log, known)
     return _checked_session(study, events, state, findings, n_presentations)
 
 
@@ -281,13 +283,15 @@ def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedL
     presented = [event for event in events if event.kind == "presented"]
     recordings = [study.training / str(e.fields["recording"]) for e in presented]
     of = {**of_study, "session": "training"}
+    known = calibration_hashes(study)
     for event, path in zip(presented, recordings, strict=True):
         place = event.fields["position"]
         if not isinstance(place, int):
             continue  # said of the event
         code, model = f"{place:03d}", str(event.fields["model"])
-        shown = Presentation(position=place, code=code, model=model, repeat=place)
-        findings += recording_findings(path, code, {code: shown}, of, event, log)
+        one = Presentation(position=place, code=code, model=model, repeat=place)
+        shown = {code: one}
+        findings += recording_findings(path, code, shown, of, event, log, known)
     ends = [event.fields["passed"] for event in events if event.kind == "complete"]
     return CheckedLog(
         record=SessionRecord(

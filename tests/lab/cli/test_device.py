@@ -195,6 +195,10 @@ def test_calibrate_does_not_move_an_arm_unasked(masrel: Caller) -> None:
     assert (done.code, "add --arm-is-free" in done.err) == (2, True)
     done = masrel(*CALIBRATE, "--arm-is-free", "--mass-kg", "1")
     assert (done.code, "--mass-kg: needs --radius-m" in done.err) == (2, True)
+    for masses in ("1", "1,1", "0,1", "-1,2"):
+        weights = ("--mass-kg", masses, "--radius-m", "0.25")
+        done = masrel(*CALIBRATE, "--arm-is-free", *weights)
+        assert (done.code, "two different masses or more" in done.err) == (2, True)
     done = masrel("device", "probe", "--device", "simulated")
     assert (done.code, "has no bus that can be asked" in done.err) == (2, True)
 

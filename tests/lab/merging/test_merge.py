@@ -16,6 +16,7 @@ from masrel.lab.conduct import (
     record_note,
     record_standing,
 )
+from masrel.lab.conduct._calibrations import write_calibration
 from masrel.lab.merging import merge_studies
 from masrel.lab.paper import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
@@ -25,6 +26,7 @@ from masrel.lab.training import SimulatedTrainee, train_rater
 from masrel.lab.verification import anchors_of, verify_study
 from tests.files import contents, edit
 from tests.lab.cli.test_train import RULES
+from tests.lab.run.test_calibrations import calibration
 from tests.lab.script import ScriptGrades
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
@@ -94,6 +96,7 @@ def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
     for study, rater in zip(sites, ("R2", "R3"), strict=True):
         with study.protocol.open("a", encoding="utf-8") as file:
             file.write(RULES)
+        write_calibration(study, calibration(days=1 if rater == "R2" else 2))
         protocol = read_protocol(study.protocol)
         grades = SimulatedGrades(protocol)
         for rehearsing in (rater, "R2"):
@@ -119,6 +122,8 @@ def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
             if name.startswith(("training/", "rehearsals/1")):
                 assert after[name.replace("s/1/", f"s/{number}/")] == content
     assert after["ratings/published_answers.csv"] == b"as it was"
+    # without them the recordings of rehearsals and of the training were not whole
+    assert sum(name.startswith("calibrations/") for name in after) == 2
     # a sheet in which nothing was typed is made again
     assert [n for n in after if n.startswith("sheets/")] == ["sheets/test_R1.csv"]
     verification = verify_study(merged)

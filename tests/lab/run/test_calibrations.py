@@ -21,6 +21,7 @@ from masrel.lab.recording import read_recording
 from masrel.lab.report import study_conduct
 from masrel.lab.run import run_session
 from masrel.lab.run._settings import calibrated
+from masrel.lab.verification import verify_study
 from tests.lab.hess.rig import ScriptedDevice, present
 from tests.lab.script import ScriptGrades
 
@@ -43,7 +44,7 @@ def calibration(days: int = 0, **changes) -> Calibration:
         "boards": [],
         "distribution": "masrel 0",
         "who": "Kim",
-        "time_utc": (NOW - timedelta(days)).isoformat(timespec="seconds"),
+        "time_utc": NOW - timedelta(days),
         "simulated": True,
         "gain_from": "weights",
         "values": {n: (v, 0.9 * v, 1.1 * v) for n, v in values.items()},
@@ -51,34 +52,57 @@ def calibration(days: int = 0, **changes) -> Calibration:
     return Calibration(**{**told, **changes})
 
 
+def last(small: Small, *, simulated: bool = True) -> tuple[Calibration, str] | None:
+    return last_calibration(*small, simulated=simulated)
+
+
 def test_the_last_one_of_the_device_counts(small: Small) -> None:
-    study, protocol = small
-    assert last_calibration(study, protocol) is None
+    study, _ = small
+    assert last(small) is None
     for days in (3, 1, 2):
         write_calibration(study, calibration(days))
     write_calibration(study, calibration(device="puck"))
-    last, sha256 = last_calibration(study, protocol)
-    assert last == calibration(1)
+    found, sha256 = last(small)
+    assert found == calibration(1)
     assert len(sha256) == 64
 
 
+def test_what_was_measured_on_an_emulator_says_nothing_of_hardware(
+    small: Small,
+) -> None:
+    write_calibration(small[0], calibration())
+    assert last(small, simulated=False) is None
+    (note,) = notes(small, moves=True)
+    assert note.endswith("was never calibrated for this study")
+
+
 @pytest.mark.parametrize(
-    ("text", "words"),
-    [("{}", "missing required field"), ('{"format": 2', "format 1, got 2")],
+    ("old", "new", "words"),
+    [
+        ('"who": "Kim",', "", "missing required field `who`"),
+        ('"format": 1', '"format": 2', "format 1, got 2"),
+        ('"coulomb_nm"', '"other"', "values: needs coulomb_nm, too"),
+        ("1.05,", "0.02,", "values.torque_gain: needs a number within its interval"),
+        ("1.05,\n      0.9450000000000001,", "0.85,\n      0.8,", "needs 0.9 to 1.1"),
+        ("2026-11-30T12:00:00Z", "2026-11-30T12:00:00", "timezone"),
+        ("2026-11-30T12:00:00Z", "yesterday", "Invalid RFC3339"),
+    ],
 )
-def test_a_file_that_is_none_is_refused(small: Small, text: str, words: str) -> None:
-    study, protocol = small
-    file = write_calibration(study, calibration())
+def test_a_file_that_is_none_is_refused(
+    small: Small, old: str, new: str, words: str
+) -> None:
+    file = write_calibration(small[0], calibration())
     whole = file.read_text(encoding="utf-8")
-    file.write_text(text if text == "{}" else whole.replace('{\n  "format": 1', text))
+    assert old in whole
+    file.write_text(whole.replace(old, new), encoding="utf-8")
     with pytest.raises(ParameterError, match=words):
-        last_calibration(study, protocol)
+        last(small)
 
 
 def test_a_session_uses_it_and_records_it(small: Small) -> None:
     study, protocol = small
-    write_calibration(study, calibration())
-    _, sha256 = last_calibration(study, protocol)
+    file = write_calibration(study, calibration())
+    _, sha256 = last(small)
     script = ScriptGrades(["1", "1", "1"])
     run_session(study, protocol, "R1", "test", grades=script, clock="simulated")
     recording = read_recording(next(study.sessions.rglob("*.npz")))
@@ -89,6 +113,11 @@ def test_a_session_uses_it_and_records_it(small: Small) -> None:
     off = columns["model_torque_nm"] - columns["command_torque_nm"]
     helping = 0.9 * 0.09 * np.radians(columns["velocity_deg_s"])
     np.testing.assert_allclose(off[rows], helping[rows], atol=1e-9)
+    assert verify_study(study).is_whole
+    file.write_text(file.read_text("utf-8").replace("Kim", "Lee"), "utf-8")
+    changed = verify_study(study)
+    assert not changed.is_whole
+    assert any(sha256 in finding.message for finding in changed.findings)
 
 
 def test_what_was_measured_replaces_what_was_assumed(small: Small) -> None:
@@ -122,7 +151,7 @@ def notes(small: Small, *, moves: bool, **device) -> list[str]:
     study, protocol = small
     settings = msgspec.structs.replace(protocol.device, **device)
     changed = msgspec.structs.replace(protocol, device=settings)
-    return [*calibration_notes(study, changed, lambda: moves, now=lambda: NOW)]
+    return [*calibration_notes(study, changed, moves_hardware=moves, now=lambda: NOW)]
 
 
 def test_a_device_that_was_never_calibrated_is_said(small: Small) -> None:
@@ -135,7 +164,7 @@ def test_a_device_that_was_never_calibrated_is_said(small: Small) -> None:
 def test_an_old_calibration_is_said_where_the_protocol_has_a_limit(
     small: Small, most: int | None, is_old: int
 ) -> None:
-    write_calibration(small[0], calibration(days=10))
+    write_calibration(small[0], calibration(days=10, simulated=False))
     found = notes(small, moves=True, calibration_max_days=most)
     assert len(found) == is_old
     assert all("of 2026-11-20 by Kim is 10 days old" in note for note in found)
