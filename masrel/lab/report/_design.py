@@ -11,6 +11,7 @@ from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
 from masrel.lab.report._material import (
     MANY_RATERS,
+    MODEL,
     Material,
     estimate_titles,
     lacking,
@@ -71,8 +72,6 @@ _CONSTANT_COLUMNS = (
     Column(key="value", heading="Value"),
 )
 
-_MODEL = Column(key="model", heading="Model", align="left")
-
 
 def design_section(material: Material) -> Iterator[Content]:
     """Describe the study: models with parameters, raters and sessions."""
@@ -118,7 +117,7 @@ def _models(material: Material) -> Table:
         name="models",
         caption="Haptic models and their parameters",
         columns=(
-            _MODEL,
+            MODEL,
             Column(key="role", heading="Role", align="left"),
             Column(key="intended_grade", heading="Intended grade", align="center"),
             *(
@@ -165,7 +164,7 @@ def _constants(material: Material) -> Iterator[Table]:
         yield Table(
             name="own_constants",
             caption="Constants that single models have of their own",
-            columns=(_MODEL, *_CONSTANT_COLUMNS),
+            columns=(MODEL, *_CONSTANT_COLUMNS),
             rows=tuple(single),
             data=material.data,
         )
@@ -187,7 +186,7 @@ def _other_kinds(material: Material) -> Iterator[Table]:
             name="other_kinds",
             caption="Models of other kinds than the spastic elbow",
             columns=(
-                _MODEL,
+                MODEL,
                 Column(key="kind", heading="Kind", align="left"),
                 Column(key="numbers", heading=heading, align="left"),
             ),

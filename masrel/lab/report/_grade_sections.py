@@ -17,6 +17,7 @@ from masrel.lab.analysis._descriptions import FEWEST_RATERS
 from masrel.lab.report._material import (
     INTERVAL,
     MANY_RATERS,
+    MODEL,
     SUPPLEMENT,
     Material,
     few,
@@ -33,8 +34,6 @@ from masrel.tables._tables import (
     number,
     percent,
 )
-
-_MODEL = Column(key="model", heading="Model", align="left")
 
 
 def grades_section(material: Material) -> Iterator[Content]:
@@ -154,7 +153,7 @@ def _grid_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     yield Table(
         name=f"grades_{grid.session}",
         caption=f"Grades of session {grid.session}: models by raters",
-        columns=(_MODEL, _INTENDED, *raters),
+        columns=(MODEL, _INTENDED, *raters),
         rows=tuple(grid.rows),
         notes=tuple(grid.notes),
         data=material.data,
@@ -201,7 +200,7 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
         name=f"grades_{grid.session}",
         caption=text,
         columns=(
-            *(_MODEL, _INTENDED),
+            *(MODEL, _INTENDED),
             *(Column(key=name, heading=name, where="csv") for name in grid.raters),
             *(Column(key=f"n_{g}", heading=g, where="page") for g in grades),
         ),
@@ -239,7 +238,7 @@ def intended_section(material: Material) -> Iterator[Content]:
         name="intended",
         caption=f"Raters who gave the intended grade, session {result.session}",
         columns=(
-            _MODEL,
+            MODEL,
             Column(key="intended_grade", heading="Intended grade", align="center"),
             Column(key="n_ratings", heading="Ratings"),
             Column(key="n_agree", heading="As intended"),
@@ -287,7 +286,7 @@ def in_person_section(material: Material) -> Iterator[Content]:
             f"by the same rater (session {result.session})"
         ),
         columns=(
-            _MODEL,
+            MODEL,
             Column(key="rater", heading="Rater", align="left"),
             Column(key="in_person", heading="In person", align="center"),
             Column(key="haptic", heading="Haptic", align="center"),
@@ -420,7 +419,7 @@ _WITHHELD = (
 _QUESTIONS = (
     Column(key="question", heading="Question", align="left"),
     Column(key="session", heading="Session", align="left"),
-    _MODEL,
+    MODEL,
     Column(key="n", heading="n"),
     Column(key="n_missing", heading="Missing"),
     Column(key="mean_sd", heading="Mean ± SD (n − 1)", where="page"),

@@ -210,6 +210,8 @@ def estimate_titles(lines: Sequence[EstimatePlan]) -> dict[str, str]:
     return titles
 
 
+MODEL = Column(key="model", heading="Model", align="left")
+
 INTERVAL = (
     Column(key="interval", heading="Interval", where="page"),
     Column(key="low", heading="Low", where="csv"),

@@ -32,6 +32,7 @@ from masrel.lab.report._material import (
     MANY_MODELS,
     MANY_RATERS,
     MANY_STRETCHES,
+    MODEL,
     SUPPLEMENT,
     Material,
     at_ranks,
@@ -54,7 +55,6 @@ _AROUND_S = 0.25  # shown before and after a measured stretch
 _SLOWEST_DRAWN_DEG_S = 1.0
 _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
 
-_MODEL = Column(key="model", heading="Model", align="left")
 
 _Floats = NDArray[np.float64]
 
@@ -322,7 +322,7 @@ def _peak_table(
             f"Peak model torque at each rater's mean speed, session {session} (N·m)"
         ),
         columns=(
-            _MODEL,
+            MODEL,
             *(Column(key=f"{r}_nm", heading=r, digits=2, where=where) for r in raters),
             Column(key="least_nm", heading="Min", digits=2),
             Column(key="median_nm", heading="Median", digits=2),

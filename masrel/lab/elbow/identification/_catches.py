@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import detrend, savgol_filter
 
 from masrel.errors import RecordingError
-from masrel.lab.elbow.identification._clusters import Rows
+from masrel.lab.elbow.identification._clusters import Floats, Rows
 from masrel.lab.elbow.identification._reading import (
     MIN_TRAVEL,
     Movement,
@@ -23,9 +23,8 @@ from masrel.lab.elbow.identification._reading import (
 )
 from masrel.lab.elbow.parameters import ElbowParameters
 
-_Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
+Bools = NDArray[np.bool_]
 
 Pace = Literal["slow", "fast"]
 
@@ -76,8 +75,8 @@ def window_length(window: float, period: float) -> int:
 
 
 def differentiate(
-    angle: _Floats, period: float, window: float
-) -> tuple[_Floats, _Floats, _Floats]:
+    angle: Floats, period: float, window: float
+) -> tuple[Floats, Floats, Floats]:
     """Return smoothed angle, velocity, acceleration, without delay.
 
     They are those of the cubic fitted to each window (Savitzky and Golay 1964), and of
@@ -100,8 +99,8 @@ def differentiate(
 
 
 def filter_alike(
-    angle: _Floats, torque: _Floats, period: float, window: float
-) -> tuple[_Floats, _Floats, _Floats, _Floats]:
+    angle: Floats, torque: Floats, period: float, window: float
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Return angle, velocity, acceleration and torque after one filter.
 
     They are of the inner samples: those with a whole window, but for the first and last
@@ -127,7 +126,7 @@ def filter_alike(
 
 
 def state_at_break(
-    time: _Floats, angle: _Floats, at: float
+    time: Floats, angle: Floats, at: float
 ) -> tuple[float, float, float]:
     """Return angle, velocity and acceleration when a hand meets resistance.
 
@@ -160,9 +159,9 @@ class Stretch:
     name: str  # of the recording, with a number if it has several
     recording: Samples = field(compare=False, repr=False)
     samples: Samples = field(compare=False, repr=False)  # of the extension alone
-    angle: _Floats = field(compare=False, repr=False)  # smoothed, like the next two
-    velocity: _Floats = field(compare=False, repr=False)
-    acceleration: _Floats = field(compare=False, repr=False)
+    angle: Floats = field(compare=False, repr=False)  # smoothed, like the next two
+    velocity: Floats = field(compare=False, repr=False)
+    acceleration: Floats = field(compare=False, repr=False)
     pace: Pace
     peak_speed: float
     rest_angle: float  # the smallest of the 0.5 s before
@@ -216,13 +215,13 @@ def find_stretches(
     return stretches, _rest_noise(samples, velocity)
 
 
-def _spans(mask: _Bools) -> list[tuple[int, int]]:
+def _spans(mask: Bools) -> list[tuple[int, int]]:
     # first sample of each run that is marked, and the first after it
     edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _runs(samples: Samples, angle: _Floats, velocity: _Floats) -> list[tuple[int, int]]:
+def _runs(samples: Samples, angle: Floats, velocity: Floats) -> list[tuple[int, int]]:
     # a short rest, without going back, belongs to the extension around it
     runs: list[tuple[int, int]] = []
     for start, stop in _spans(velocity > _MOVING):
@@ -234,7 +233,7 @@ def _runs(samples: Samples, angle: _Floats, velocity: _Floats) -> list[tuple[int
     return runs
 
 
-def _rest_noise(samples: Samples, velocity: _Floats) -> float:
+def _rest_noise(samples: Samples, velocity: Floats) -> float:
     still = (np.abs(velocity) < 0.5 * _MOVING) & ~samples.in_gap & ~samples.saturated
     squares, df = 0.0, 0
     for start, stop in _spans(still):
@@ -251,15 +250,15 @@ class Part(NamedTuple):
     well; `measured` is the torque as recorded.
     """
 
-    time: _Floats
-    angle: _Floats
-    velocity: _Floats
-    acceleration: _Floats
-    jerk: _Floats
-    torque: _Floats
-    measured: _Floats
+    time: Floats
+    angle: Floats
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
+    torque: Floats
+    measured: Floats
 
-    def keep(self, which: _Bools | _Ints) -> "Part":
+    def keep(self, which: Bools | _Ints) -> "Part":
         """Return some of the samples."""
         return Part(*(column[which] for column in self))
 
@@ -319,7 +318,7 @@ def part_of(stretch: Stretch, which: slice, *, anew: float | None = None) -> Par
     return Part(samples.time, angle, velocity, acceleration, jerk, torque, torque)
 
 
-def _slope(values: _Floats, period: float) -> _Floats:
+def _slope(values: Floats, period: float) -> Floats:
     return np.gradient(values, period) if values.size > 1 else np.zeros_like(values)
 
 
@@ -353,12 +352,12 @@ class Law:
         """Return whether the torque that is read takes time to step."""
         return self.lag > 0.0 or self.catch_rise > 0.0
 
-    def pre_catch(self, part: Part) -> _Floats:
+    def pre_catch(self, part: Part) -> Floats:
         """Return the torque of (1) without the constant k·θ_rest, N·m."""
         law = self.damping * part.velocity + self.stiffness * part.angle
         return np.asarray(law + self.inertia * part.acceleration)
 
-    def arm(self, part: Part, trial: str) -> _Floats:
+    def arm(self, part: Part, trial: str) -> Floats:
         """Return what weight, inertia and drift add to the torque, N·m."""
         weight = self.gravity * np.sin(part.angle - self.gravity_angle)
         drift = self.drifts.get(trial, self.drift) * part.time
@@ -518,7 +517,7 @@ def _onset(stretch: Stretch, place: int, limit: float) -> tuple[float, float]:
     return time, float(np.interp(time, samples.time, stretch.angle))
 
 
-def _jump(time: _Floats, angle: _Floats, near: float) -> float:
+def _jump(time: Floats, angle: Floats, near: float) -> float:
     # where a motor starts at once, which a filter of speeds sees before it is: rest,
     # and a parabola from an instant on, by least squares
     window = np.abs(time - near) <= 3.0 * _JUMP
@@ -606,14 +605,14 @@ def catch_levels(trial: Trial, law: Law) -> CatchLevels | None:
 
 
 def find_changes(
-    torque: _Floats,
-    pre_catch: _Floats,
-    angle: _Floats,
+    torque: Floats,
+    pre_catch: Floats,
+    angle: Floats,
     *,
     first: int,
     lengths: tuple[int, int, int],
     additive: bool,
-    pushed: _Floats | float = 0.0,
+    pushed: Floats | float = 0.0,
 ) -> tuple[int | None, int | None, float]:
     """Return the samples where a catch begins and ends, and the residuals' deviation.
 
@@ -675,23 +674,23 @@ _ONE, _TORQUE, _REST, _ANGLE, _LATER = range(5)
 class _Sums(NamedTuple):
     # sums of the products of two of: 1, torque, torque - pre-catch law, angle, and
     # torque - what the law adds after the catch; those of any stretch take no loop
-    before: _Floats  # each place, (5, 5, n + 1)
-    at: _Floats  # the angle at each place
-    offset: _Floats  # what the law adds there
+    before: Floats  # each place, (5, 5, n + 1)
+    at: Floats  # the angle at each place
+    offset: Floats  # what the law adds there
 
     @classmethod
-    def of(cls, *columns: _Floats) -> "_Sums":
+    def of(cls, *columns: Floats) -> "_Sums":
         *varying, offset = columns
         rows = np.stack([np.ones_like(offset), *varying])
         products = np.cumsum(rows[:, None] * rows, axis=2)
         at = np.append(rows[_ANGLE], rows[_ANGLE, -1])
         return cls(np.pad(products, [(0, 0), (0, 0), (1, 0)]), at, offset)
 
-    def between(self, i: int, j: int, low: _Ints, high: _Ints | int = -1) -> _Floats:
+    def between(self, i: int, j: int, low: _Ints, high: _Ints | int = -1) -> Floats:
         before = self.before[i, j]
         return np.asarray(before[high] - before[low])
 
-    def about_mean(self, i: int, low: _Ints, high: _Ints) -> _Floats:
+    def about_mean(self, i: int, low: _Ints, high: _Ints) -> Floats:
         # Σ(x - mean)² over the samples from low to before high; 0 of none
         total = self.between(_ONE, i, low, high)
         mean = total / np.maximum(high - low, 1)
@@ -700,7 +699,7 @@ class _Sums(NamedTuple):
 
 def _squares(
     sums: _Sums, starts: _Ints, ends: _Ints, lengths: tuple[int, ...]
-) -> _Floats:
+) -> Floats:
     # residual sum of squares of every pair, shape (n_starts, n_ends); without `gap`
     # samples after a step, which then may be anywhere between two candidates, and
     # without the two around the end of the peak, whose length is no whole number
@@ -720,8 +719,8 @@ def _squares(
 
 
 def _hinge(
-    sums: _Sums, low: _Ints, end: _Ints, offset: _Floats | float
-) -> tuple[_Floats, _Floats, _Floats]:
+    sums: _Sums, low: _Ints, end: _Ints, offset: Floats | float
+) -> tuple[Floats, Floats, Floats]:
     # Of torque from `low` on, about its mean: its squares, its products with the angle
     # travelled since `end`, and the squares of that.
     n = sums.offset.size

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-_Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 # Relative to columns of length 1: below it, a column is a combination of the others.
 _RANK_TOLERANCE = 1e-10
@@ -29,8 +29,8 @@ _BLOCK = 256  # rows of a block
 class Rows(NamedTuple):
     """The equations of one trial: design (n_rows, n_parameters), target (n_rows,)."""
 
-    design: _Floats
-    target: _Floats
+    design: Floats
+    target: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,14 +42,14 @@ class ClusteredFit:
     of each parameter.
     """
 
-    values: _Floats = field(compare=False, repr=False)
-    covariance: _Floats = field(compare=False, repr=False)
-    df: _Floats = field(compare=False, repr=False)
+    values: Floats = field(compare=False, repr=False)
+    covariance: Floats = field(compare=False, repr=False)
+    df: Floats = field(compare=False, repr=False)
     residual_sd: float
     n_trials: NDArray[np.int64] = field(compare=False, repr=False)
 
 
-def triangle(table: _Floats) -> _Floats:
+def triangle(table: Floats) -> Floats:
     """Return R of a tall table's QR, shape (n_columns, n_columns) or less.
 
     It is found block by block: R of the blocks' R's is that of the table.
@@ -64,7 +64,7 @@ def triangle(table: _Floats) -> _Floats:
     return np.asarray(np.linalg.qr(table, mode="r"), dtype=np.float64)
 
 
-def partial_out(table: _Floats, n_local: int) -> _Floats:
+def partial_out(table: Floats, n_local: int) -> Floats:
     """Return rows of a table without what its first `n_local` columns explain.
 
     Shape (n_columns - n_determined, n_columns - n_local): all that least squares see of
@@ -123,7 +123,7 @@ def solve(trials: Sequence[Rows], *, n_local: int = 0) -> ClusteredFit:
     )
 
 
-def _stacked(trials: Sequence[Rows]) -> tuple[_Floats, _Floats]:
+def _stacked(trials: Sequence[Rows]) -> tuple[Floats, Floats]:
     # designs (n_trials, n_rows, n_parameters) and targets (n_trials, n_rows) of as few
     # rows that say the same, zeros where a trial has fewer
     n = trials[0].design.shape[1] + 1
@@ -134,7 +134,7 @@ def _stacked(trials: Sequence[Rows]) -> tuple[_Floats, _Floats]:
     return stacked[..., :-1], stacked[..., -1]
 
 
-def _determined(gram: _Floats) -> NDArray[np.bool_]:
+def _determined(gram: Floats) -> NDArray[np.bool_]:
     # parameters that no direction without information touches
     scale = np.sqrt(np.diag(gram))
     keep = scale > 0.0
@@ -145,14 +145,14 @@ def _determined(gram: _Floats) -> NDArray[np.bool_]:
     return np.asarray(keep)
 
 
-def _outside(x: _Floats, inverse: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+def _outside(x: Floats, inverse: Floats) -> tuple[Floats, Floats, Floats]:
     # I - H of every trial, (n_trials, n_rows, n_rows), its eigenvalues and -vectors
     matrix = np.eye(x.shape[1]) - x @ inverse @ x.transpose(0, 2, 1)
     sizes, directions = np.linalg.eigh(0.5 * (matrix + matrix.transpose(0, 2, 1)))
     return matrix, sizes, directions
 
 
-def _robust(x: _Floats, errors: _Floats, inverse: _Floats) -> tuple[_Floats, _Floats]:
+def _robust(x: Floats, errors: Floats, inverse: Floats) -> tuple[Floats, Floats]:
     # CR2: V = M (Σ X'A e e' A X) M with M = (X'X)⁻¹ and A = (I - H_gg)^(-1/2). A trial
     # that alone determines a direction has no error along it: generalized inverse, as
     # Pustejovsky and Tipton have it.
@@ -178,7 +178,7 @@ def _robust(x: _Floats, errors: _Floats, inverse: _Floats) -> tuple[_Floats, _Fl
     return scores.T @ scores, df
 
 
-def left_out_steps(trials: Sequence[Rows]) -> _Floats:
+def left_out_steps(trials: Sequence[Rows]) -> Floats:
     """Return per trial what its rows move the fit by, were they left out.
 
     The fit of all trials is at 0: -(X'X)⁻¹X_g'(I - H_gg)⁻¹e_g; ``nan`` of a trial that

@@ -16,16 +16,16 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.special import erfcx, log_ndtr
 
-from masrel.lab.elbow.identification._catches import Catch, Law, Part, Trial
+from masrel.lab.elbow.identification._catches import Bools, Catch, Law, Part, Trial
 from masrel.lab.elbow.identification._clusters import (
     ClusteredFit,
     FittedParameter,
+    Floats,
     Rows,
     Step,
     left_out_steps,
@@ -33,9 +33,6 @@ from masrel.lab.elbow.identification._clusters import (
     solve,
     triangle,
 )
-
-_Floats = NDArray[np.float64]
-_Bools = NDArray[np.bool_]
 
 # What a trial's torque is linear in, in the order of the design matrix's columns, and
 # what it is differentiated by numerically, in steps of so many seconds.
@@ -84,9 +81,9 @@ Row = tuple[str, float, Mapping[str, float]]
 class _Design(NamedTuple):
     # the matrix (n_samples, n_linear), the angle since the catch, and where torque may
     # climb with it
-    matrix: _Floats
-    past: _Floats
-    climbs: _Bools
+    matrix: Floats
+    past: Floats
+    climbs: Bools
 
 
 class Equations:
@@ -141,7 +138,7 @@ class Equations:
         self.local = tuple(name for name, is_there in has.items() if is_there)
         self._first = self._design(held.lag, held.catch_rise, 0.0)
 
-    def values(self, shared: _Floats, local: _Floats) -> dict[str, float]:
+    def values(self, shared: Floats, local: Floats) -> dict[str, float]:
         """Return all parameters by name, those of the arm that are held among them."""
         names = (*self.names, *self.local)
         numbers = (*shared.tolist(), *local.tolist())
@@ -168,7 +165,7 @@ class Equations:
         of_trial = np.column_stack([part.time - middle, np.ones(n), steps])
         return _Design(np.column_stack([columns, of_trial]), past, climbs)
 
-    def _smooth(self, part: Part, lag: float) -> _Floats:
+    def _smooth(self, part: Part, lag: float) -> Floats:
         # a sensor that lags by T reads x - T·x' + T²·x'' of what is smooth
         angle = part.angle - lag * (part.velocity - lag * part.acceleration)
         velocity = part.velocity - lag * (part.acceleration - lag * part.jerk)
@@ -188,7 +185,7 @@ class Equations:
 
     def _from_catch(
         self, part: Part, catch: Catch, timed: tuple[float, float, float]
-    ) -> tuple[_Floats, _Floats, _Floats]:
+    ) -> tuple[Floats, Floats, Floats]:
         # what _smooth returns, of samples from the catch on, and the two steps of (3)
         lag, rise, shift = timed
         since = part.time - (catch.time + shift)
@@ -220,7 +217,7 @@ class Equations:
         down = _step(since - (self.peak_end - catch.time), lag)
         return np.column_stack([held, weight, pushed]), up, down
 
-    def start(self, shared: Mapping[str, float]) -> _Floats:
+    def start(self, shared: Mapping[str, float]) -> Floats:
         """Return where to begin with the trial's own: (3), and what was seen."""
         values = dict.fromkeys(self.local, 0.0)
         if self.catch is not None:
@@ -230,7 +227,7 @@ class Equations:
             values |= {name: x if math.isfinite(x) else 0.0 for name, x in own.items()}
         return np.array([values[name] for name in self.local])
 
-    def table(self, shared: _Floats, local: _Floats) -> _Floats:
+    def table(self, shared: Floats, local: Floats) -> Floats:
         """Return the columns [own | shared | residuals], over their spreads."""
         values, names = self.values(shared, local), (*self.local, *self.names)
         design = self.design(values)
@@ -253,7 +250,7 @@ class Equations:
         table[n:, -1] = [left for _, left, _ in rows]
         return table
 
-    def by_late_angle(self, values: Mapping[str, float]) -> _Floats:
+    def by_late_angle(self, values: Mapping[str, float]) -> Floats:
         """Return the residuals' derivatives by how much earlier the angle is, 1/s."""
         shared, local = (
             np.array([values[name] for name in names])
@@ -272,7 +269,7 @@ class Equations:
         )
         return np.asarray((early - late) / (2.0 * _STEP))
 
-    def law(self, values: Mapping[str, float]) -> _Floats:
+    def law(self, values: Mapping[str, float]) -> Floats:
         """Return the torque of the law at the trial's samples, N·m."""
         return self._evaluate(self.design(values), values)[0]
 
@@ -284,7 +281,7 @@ class Equations:
 
     def _evaluate(
         self, design: _Design, values: Mapping[str, float]
-    ) -> tuple[_Floats, _Floats, _Floats]:
+    ) -> tuple[Floats, Floats, Floats]:
         # the law, what k_post multiplies in it, and its derivative by the travel
         stiffness = values.get("post_catch_stiffness", 0.0)
         climb = slope = np.zeros(design.past.size)
@@ -331,7 +328,7 @@ class Equations:
             rows.append(("limit", left, {"catch_travel": by_mean}))
         return rows
 
-    def rows(self, shared: Mapping[str, float], table: _Floats) -> Rows:
+    def rows(self, shared: Mapping[str, float], table: Floats) -> Rows:
         """Return what a whole table says of the shared parameters, linearly."""
         limit = self.limit
         if self.catch is not None and limit is not None and "catch_travel" in shared:
@@ -346,14 +343,14 @@ class Equations:
         return Rows(rest[:, :-1], -rest[:, -1])
 
 
-def _step(since: _Floats, lag: float) -> _Floats:
+def _step(since: Floats, lag: float) -> Floats:
     # a step as a sensor of first order reads it
     if lag <= 0.0:
         return np.where(since >= 0.0, 1.0, 0.0)
     return np.where(since > 0.0, -np.expm1(-np.maximum(since, 0.0) / lag), 0.0)
 
 
-def _slow(values: _Floats, period: float, lag: float) -> _Floats:
+def _slow(values: Floats, period: float, lag: float) -> Floats:
     # what is 0 at first as that sensor reads it
     if lag <= 0.0 or values.size < 2:
         return values
@@ -396,7 +393,7 @@ def beyond(mean: float, limit: DetectionLimit, sd: float) -> tuple[float, float,
     return left, -ratio / (size * left), math.sqrt(ratio * (z + ratio)) / size
 
 
-def mills(z: _Floats) -> _Floats:
+def mills(z: Floats) -> Floats:
     """Evaluate φ/Φ of the standard normal distribution."""
     return np.asarray(math.sqrt(2.0 / math.pi) / erfcx(-z / math.sqrt(2.0)))
 
@@ -408,8 +405,8 @@ class JointFit:
     equations: Sequence[Equations]
     shared: dict[str, float]
     values: list[dict[str, float]]  # each trial's parameters by name
-    tables: list[_Floats]  # each trial's equations there
-    laws: tuple[_Floats, ...]  # and torque, N·m
+    tables: list[Floats]  # each trial's equations there
+    laws: tuple[Floats, ...]  # and torque, N·m
     steps: tuple[Step, ...] = ()  # the fits before
     fast: tuple[Trial, ...] = ()  # those without a catch among them
 
@@ -424,7 +421,7 @@ class JointFit:
         return {e.name: e for step in self.steps for e in step.estimates}
 
     @property
-    def residuals(self) -> list[_Floats]:
+    def residuals(self) -> list[Floats]:
         """Return each trial's torque, measured less fitted, N·m."""
         pairs = zip(self.equations, self.laws, strict=True)
         return [e.part.measured - law for e, law in pairs]
@@ -474,10 +471,10 @@ def fit_together(
     cuts = np.cumsum([len(e.local) for e in equations])[:-1]
     jacobian = np.zeros((0, begin.size))
 
-    def own_of(x: _Floats) -> list[tuple[Equations, _Floats]]:
+    def own_of(x: Floats) -> list[tuple[Equations, Floats]]:
         return list(zip(equations, np.split(x[n:], cuts), strict=True))
 
-    def residuals(x: _Floats) -> _Floats:
+    def residuals(x: Floats) -> Floats:
         # Of each trial, R of the QR of [Jacobian | residuals]: the same sum of squares
         # and gradient in as many rows as columns.
         nonlocal jacobian
@@ -487,7 +484,7 @@ def fit_together(
         jacobian = np.column_stack([whole[:, :-1], of_trials])
         return np.asarray(whole[:, -1])
 
-    def derivatives(_: _Floats) -> _Floats:
+    def derivatives(_: Floats) -> Floats:
         return jacobian  # of the last residuals, which are those of this point
 
     solution = least_squares(
@@ -526,7 +523,7 @@ def with_late_angle(joint: JointFit, lag: float) -> tuple[JointFit, float]:
     return whole, float(solve(whole.rows()).values[-1])
 
 
-def left_out_errors(joint: JointFit) -> _Floats:
+def left_out_errors(joint: JointFit) -> Floats:
     """Return each trial's mean square distance from what the others say of it."""
     # What the others say is reckoned as linear as it is at the fit. Constant, peak,
     # residual and travel are its own; its drift is the others' mean, or a drift would

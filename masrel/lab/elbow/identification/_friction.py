@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel._input import warn_caller
 from masrel.errors import RecordingError, RecordingWarning
 from masrel.lab.elbow.identification._catches import Part, filtered_part, window_length
 from masrel.lab.elbow.identification._clusters import (
     FittedParameter,
+    Floats,
     Rows,
     fitted,
     solve,
@@ -26,8 +26,6 @@ from masrel.lab.elbow.identification._reading import (
     even_samples,
     read_movement,
 )
-
-_Floats = NDArray[np.float64]
 
 # Slower, the direction of motion is not certain and the device may stick, rad/s.
 _MOVING = math.radians(5.0)
@@ -43,7 +41,7 @@ class Stroke:
 
     recording: str
     part: Part = field(compare=False, repr=False)
-    fitted: _Floats = field(compare=False, repr=False)
+    fitted: Floats = field(compare=False, repr=False)
 
 
 def _strokes(movement: Movement) -> list[Part]:
@@ -86,7 +84,7 @@ class FrictionFit:
     """
 
     estimates: tuple[FittedParameter, ...]
-    correlation: _Floats = field(compare=False, repr=False)
+    correlation: Floats = field(compare=False, repr=False)
     relative_error: float
     torque_sd: float
     strokes: tuple[Stroke, ...] = field(repr=False)

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from masrel._input import refuse, warn_caller
@@ -45,6 +44,7 @@ from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
     ClusteredFit,
     FittedParameter,
+    Floats,
     Step,
     fitted,
 )
@@ -76,8 +76,6 @@ from masrel.lab.elbow.identification._rounds import (
     untimed_terms,
 )
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
-
-_Floats = NDArray[np.float64]
 
 # Options of `fit` that are tried in a comparison, each alone.
 TERMS = ("gravity", "arm_inertia", "drift", "lag", "rise")
@@ -138,15 +136,15 @@ class ElbowFit:
     """
 
     estimates: tuple[FittedParameter, ...]
-    correlation: _Floats = field(compare=False, repr=False)
+    correlation: Floats = field(compare=False, repr=False)
     steps: tuple[Step, ...]
     relative_error: float
     torque_sd: float
     lack_of_fit: LackOfFit
-    cross_validation: _Floats = field(compare=False, repr=False)
+    cross_validation: Floats = field(compare=False, repr=False)
     trials: tuple[Trial, ...] = field(repr=False)
     levels: tuple[CatchLevels, ...] = field(compare=False, repr=False)
-    fitted_torque: tuple[_Floats, ...] = field(compare=False, repr=False)
+    fitted_torque: tuple[Floats, ...] = field(compare=False, repr=False)
     constants: ElbowParameters
     arm: Mapping[str, float | str]
     offsets: tuple[float, ...] = field(repr=False)
@@ -594,7 +592,7 @@ def _n_censored(last: JointFit) -> int:
 
 def _correlation(
     shared: ClusteredFit, last: JointFit, estimates: Sequence[FittedParameter]
-) -> _Floats:
+) -> Floats:
     names = list(last.shared)
     places = [names.index(e.name) if e.name in names else -1 for e in estimates]
     sd = np.sqrt(np.diag(shared.covariance))
@@ -676,7 +674,7 @@ class ComparedFit:
     is_chosen: bool
 
 
-def against_best(squares: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+def against_best(squares: Floats) -> tuple[Floats, Floats, Floats]:
     """Return mean squares (n_fits,), and what they are above the least, with errors.
 
     `squares` (n_fits, n) are of what was left out in turn, which is what differs; of

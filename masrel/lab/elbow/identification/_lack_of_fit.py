@@ -13,14 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtr
 
 from masrel.lab.elbow.identification._catches import Part
-from masrel.lab.elbow.identification._clusters import Rows, partial_out, solve
+from masrel.lab.elbow.identification._clusters import Floats, Rows, partial_out, solve
 from masrel.lab.elbow.identification._equations import LINEAR, Equations, JointFit
-
-_Floats = NDArray[np.float64]
 
 # Of all tests together: how often a fit of the right law is called a wrong one.
 LEVEL = 0.02
@@ -268,7 +265,7 @@ def _pooled(phases: Sequence[PhaseResidual]) -> float:
 
 
 def _test(
-    name: str, n_shared: int, place: int, rest: Sequence[_Floats]
+    name: str, n_shared: int, place: int, rest: Sequence[Floats]
 ) -> StructureTest | None:
     # of the column at this place beside the shared ones; residuals are after these
     columns = [*range(n_shared), place]
@@ -290,9 +287,7 @@ def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:
     return tuple(replace(test, adjusted=p) for test, p in pairs)
 
 
-def _added(
-    e: Equations, values: Mapping[str, float], law: _Floats
-) -> dict[str, _Floats]:
+def _added(e: Equations, values: Mapping[str, float], law: Floats) -> dict[str, Floats]:
     # columns of what the law has not, over the rows of the whole table
     n, catch, after = e.part.time.size, e.catch, e.trial.after
     matrix = dict(zip(LINEAR, e.design(values).matrix.T, strict=True))
@@ -384,7 +379,7 @@ def own_drifts(slow: Sequence[Part], gravity_angle: float) -> StructureTest | No
     )
 
 
-def _left(design: _Floats, target: _Floats) -> tuple[float, int]:
+def _left(design: Floats, target: Floats) -> tuple[float, int]:
     # sum of squares of what least squares leave, and the rank of the design
     size = np.linalg.norm(design, axis=0)
     scaled = design / np.where(size > 0.0, size, 1.0)
@@ -393,9 +388,9 @@ def _left(design: _Floats, target: _Floats) -> tuple[float, int]:
 
 
 def _phases(
-    equations: Sequence[Equations], left: Sequence[_Floats]
+    equations: Sequence[Equations], left: Sequence[Floats]
 ) -> tuple[PhaseResidual, ...]:
-    pieces: dict[str, list[_Floats]] = {name: [] for name in _PHASES}
+    pieces: dict[str, list[Floats]] = {name: [] for name in _PHASES}
     for e, torque in zip(equations, left, strict=True):
         time, place = e.part.time, np.zeros(e.part.time.size, dtype=np.int64)
         if e.trial.stretch.pace == "fast":
@@ -410,7 +405,7 @@ def _phases(
     return tuple(_phase(name, each) for name, each in pieces.items() if each)
 
 
-def _phase(phase: str, pieces: Sequence[_Floats]) -> PhaseResidual:
+def _phase(phase: str, pieces: Sequence[Floats]) -> PhaseResidual:
     runs = expected = products = squares = raw = 0.0
     for left in pieces:
         positive = left > 0.0

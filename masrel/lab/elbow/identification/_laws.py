@@ -22,6 +22,7 @@ from masrel.lab.elbow._torque import torque
 from masrel.lab.elbow.identification._catches import Law, Part, differentiate
 from masrel.lab.elbow.identification._clusters import (
     FittedParameter,
+    Floats,
     Rows,
     fitted,
     left_out_steps,
@@ -50,8 +51,6 @@ from masrel.lab.elbow.tone import (
     ThresholdReflex,
     ToneModel,
 )
-
-_Floats = NDArray[np.float64]
 
 # Torque is compared in means over so many seconds, those of a law over so many times
 # within; the angle's filter passes no more.
@@ -206,7 +205,7 @@ class LawFit:
     name: str
     estimates: tuple[FittedParameter, ...] = ()
     rms: float = math.nan
-    squares: _Floats = field(compare=False, repr=False)
+    squares: Floats = field(compare=False, repr=False)
     reason: str | None = None
 
     @property
@@ -241,8 +240,8 @@ class LawComparison:
 
     fits: tuple[LawFit, ...]
     elbow: ElbowFit | None
-    worse: _Floats = field(compare=False, repr=False)
-    worse_se: _Floats = field(compare=False, repr=False)
+    worse: Floats = field(compare=False, repr=False)
+    worse_se: Floats = field(compare=False, repr=False)
     recordings: tuple[str, ...]
     simulated: bool
 
@@ -279,11 +278,11 @@ class LawComparison:
 class _Binned(NamedTuple):
     # one recording: its motion and times of it; means of torque, and what an arm adds
     motion: Recorded
-    times: _Floats  # (n_means * _WITHIN,)
-    torque: _Floats
-    arm: _Floats  # (n_means, n_terms), for 1
+    times: Floats  # (n_means * _WITHIN,)
+    torque: Floats
+    arm: Floats  # (n_means, n_terms), for 1
 
-    def left(self, law: _Floats, arm: _Floats) -> _Floats:
+    def left(self, law: Floats, arm: Floats) -> Floats:
         # its torque less that of a law up to a constant, as one of equal recordings
         means = law.reshape(-1, _WITHIN).mean(axis=1)
         left = self.torque - means - self.arm @ arm
@@ -442,15 +441,15 @@ def _law_fit(
         + [(-math.inf, math.inf)] * sum(fits)
     ).T
 
-    def left(x: _Floats, each: _Binned) -> _Floats:
+    def left(x: Floats, each: _Binned) -> Floats:
         joint, arm = row.made(x[: len(row.free)].tolist()), fixed.copy()
         arm[fits] = x[len(row.free) :]
         return each.left(joint.torque(each.motion, each.times), arm)
 
-    def residuals(x: _Floats) -> _Floats:
+    def residuals(x: Floats) -> Floats:
         return np.concatenate([left(x, each) for each in binned])
 
-    def search(start: _Floats, most: int) -> OptimizeResult:
+    def search(start: Floats, most: int) -> OptimizeResult:
         return least_squares(
             residuals,
             start,
@@ -485,7 +484,7 @@ def _law_fit(
 
 def _estimates(
     names: Sequence[str],
-    values: _Floats,
+    values: Floats,
     is_free: NDArray[np.bool_],
     rows: Sequence[Rows],
     options: Mapping[str, Any],

@@ -28,6 +28,7 @@ from masrel.lab.elbow.identification._catches import (
 from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
     FittedParameter,
+    Floats,
     Rows,
     Step,
     fitted,
@@ -39,8 +40,6 @@ from masrel.lab.elbow.identification._equations import (
     mills,
 )
 from masrel.lab.elbow.parameters import ElbowParameters
-
-_Floats = NDArray[np.float64]
 
 # Mean speeds must span this, rad/s: less is one speed, which has no slope.
 _MIN_SPAN = math.radians(5.0)
@@ -164,10 +163,10 @@ def fit_catch_line(
         )
         return Step(name=title, estimates=estimates, residual_sd=math.nan)
 
-    def left(x: _Floats) -> _Floats:
+    def left(x: Floats) -> Floats:
         return np.array([line_row(c, x[0], x[1], slowest)[0] for c in used])
 
-    def slopes(x: _Floats) -> _Floats:
+    def slopes(x: Floats) -> Floats:
         return np.array([line_row(c, x[0], x[1], slowest)[1:] for c in used])
 
     plain = np.polyfit(-speeds, [catch.angle for catch in used], 1)[::-1]
@@ -247,9 +246,9 @@ def _limit(
 class Travels(NamedTuple):
     """Travels that were seen, and limits behind which the others lie, (n,) each."""
 
-    seen: _Floats
-    limit: _Floats
-    limit_sd: _Floats
+    seen: Floats
+    limit: Floats
+    limit_sd: Floats
 
     def log_likelihood(self, mean: float, sd: float) -> float:
         """Evaluate the log-likelihood of normal travels, without its constant."""
@@ -258,7 +257,7 @@ class Travels(NamedTuple):
         density = -0.5 * float(scaled @ scaled) - self.seen.size * math.log(sd)
         return density + float(log_ndtr(z).sum())
 
-    def score(self, mean: float, sd: float) -> _Floats:
+    def score(self, mean: float, sd: float) -> Floats:
         """Differentiate the log-likelihood by mean and sd."""
         scaled = (self.seen - mean) / sd
         # travels scatter, and so does what is seen of an end
