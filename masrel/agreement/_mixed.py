@@ -102,12 +102,16 @@ class _Likelihood:
             return np.asarray(self.parts(steps)[0].imag / _TINY)
 
         # P V P = P gives those of the residual from slopes and curvatures of the
-        # determinants, here by differences over a step that is small but for rounding
+        # determinants, here by differences of fourth order: right to some 1e-12, which
+        # a shorter step would lose to rounding
         least = 1.0 / self.sizes.max(), len(self.basis) / self.n_ratings
-        step = np.diag(1e-5 * (ratios + least))
-        ways = [slopes(ratios + h) - slopes(ratios - h) for h in step]
+        steps = np.diag(1e-3 * (ratios + least))
+        near, far = (
+            np.array([slopes(ratios + n * h) - slopes(ratios - n * h) for h in steps])
+            for n in (1.0, 2.0)
+        )
         traces = np.empty((3, 3))
-        traces[:2, :2] = -np.array(ways) / (2.0 * step.sum(axis=0)[:, None])
+        traces[:2, :2] = (far - 8.0 * near) / (12.0 * steps.sum(axis=0)[:, None])
         slope = slopes(ratios)
         traces[2, :2] = traces[:2, 2] = slope - traces[:2, :2] @ ratios
         traces[2, 2] = self.n_ratings - 1 - ratios @ slope - ratios @ traces[:2, 2]

@@ -256,11 +256,11 @@ def _bar(place: _Place, size: float) -> float:
     if place.kind == "standard_error":
         chance = place.around.get("chance")
         near_one = isinstance(chance, float) and 1.0 - chance < 1e-6
-        # a fitted inertia is nearly collinear with what else is fitted
-        is_loose = near_one or place.group == "fit"
-        return (1e-9 if is_loose else 1e-12) * size
-    # Roots are searched to some 1e-9; what is 0 but for rounding has no digits
-    return (2e-9 if place.kind == "interval end" else 1e-9) * max(size, 1e-3)
+        if place.group == "fit":
+            return 1e-10 * size  # nearly collinear: other processors differ by 1e-11
+        return (1e-9 if near_one else 1e-12) * size
+    # what is 0 but for rounding has no digits
+    return 1e-9 * max(size, 1e-3 if place.kind == "interval end" else 1e-6)
 
 
 def _share_of_tables(place: _Place) -> float:
