@@ -36,7 +36,6 @@ __all__ = [
     "PHASES",
     "RAMPS",
     "RECORDING_COLUMNS",
-    "TORQUE_GAINS",
     "Channel",
     "Phase",
     "Recording",
@@ -130,8 +129,8 @@ MEASURED_TORQUE = Channel(name="measured_torque", unit="nm")
 ESTIMATED_TORQUE = Channel(name="estimated_torque", unit="nm")
 """The same, as an amplifier estimates it from its current."""
 
-TORQUE_GAINS = (0.9, 1.1)
-"""How many times the torque that it is sent a device may give, at least and at most."""
+# How many times the torque that it is sent a device may give, at least and at most.
+_TORQUE_GAINS = (0.9, 1.1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ from masrel.errors import ParameterError
 from masrel.lab._event_log import utc_now
 from masrel.lab._study_files import MAX_SMALL, check_format, read_regular
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.recording import TORQUE_GAINS
+from masrel.lab.recording import _TORQUE_GAINS
 
 _FORMAT = 1
 
@@ -48,9 +48,9 @@ class Calibration(msgspec.Struct, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         # A file may have been edited, and what it says goes to a motor
-        missing = [name for name in _NEEDED if name not in self.values]
-        if missing:
-            raise ValueError(f"values: needs {', '.join(missing)}, too")
+        absent = [name for name in _NEEDED if name not in self.values]
+        if absent:
+            raise ValueError(f"values: needs {', '.join(absent)}, too")
         for name, (value, low, high) in self.values.items():
             if not (low <= value <= high and math.isfinite(high - low)):
                 raise ValueError(
@@ -58,7 +58,7 @@ class Calibration(msgspec.Struct, frozen=True, kw_only=True):
                     f"and [{low}, {high}]"
                 )
         gain, *_ = self.values.get("torque_gain", (1.0,))
-        least, most = TORQUE_GAINS
+        least, most = _TORQUE_GAINS
         if not least <= gain <= most:
             raise ValueError(f"values.torque_gain: needs {least} to {most}, got {gain}")
 

@@ -28,7 +28,7 @@ from masrel.lab.hess._free_arm import (
 )
 from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
-from masrel.lab.recording import TORQUE_GAINS
+from masrel.lab.recording import _TORQUE_GAINS
 
 _REST_S = 2.0
 
@@ -223,7 +223,7 @@ def fit_gain(points: Sequence[GainPoint]) -> dict[str, Measured]:
     (slope, offset, _), (error, offset_error, _) = linear_fit(design, sent)
     share = _measured(slope, error, df)
     gain = Measured(1.0 / slope, 1.0 / share.high, 1.0 / share.low)
-    least, most = TORQUE_GAINS
+    least, most = _TORQUE_GAINS
     if not least <= gain.value <= most:
         raise DeviceError(
             f"gain: needs a torque of {least:g} to {most:g} times the one that "
