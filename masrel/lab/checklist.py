@@ -204,7 +204,7 @@ class _Checklist:
     masrel_version: str
 
 
-_GRADE = "Very good, adequate, doubtful or inadequate: the authors grade this."
+_GRADE = "The authors rate this as very good, adequate, doubtful or inadequate."
 
 
 def _standard(topic: str, *facts: str) -> _Item:
@@ -259,8 +259,7 @@ _GUIDELINES: dict[str, tuple[str, str, tuple[_Item, ...]]] = {
             _Item(
                 topic="Characteristics of raters and subjects",
                 facts=("subjects", "characteristics"),
-                to_add="Characteristics of the raters, as far as the protocol has "
-                "none.",
+                to_add="Characteristics of the raters that the protocol does not have.",
             ),
             _Item(
                 topic="Estimates with their uncertainty",
@@ -339,7 +338,7 @@ def _filled(
     elif not names:
         to_add = "To be stated by the authors."
     elif "logs" in item.sources and not (facts.days or to_add):
-        to_add = "What no log of a session says."
+        to_add = "What the session logs do not record."
     item = replace(item, number=number, facts=(), to_add=to_add)
     if not names:
         return item
@@ -353,7 +352,7 @@ def _filled(
 
 def _notes(facts: _StudyFacts) -> tuple[str, ...]:
     if facts.ratings is None:
-        return ("No session has begun: what follows is the plan.",)
+        return ("No session has begun yet; this is the plan.",)
     counts = facts.ratings.simulated_counts
     return (counts,) if counts else ()
 

@@ -117,7 +117,13 @@ _recordings = grouped(
         multiple=True,
     ),
 )
-_level = click.option("--level", type=float, default=0.95, show_default=True)
+_level = click.option(
+    "--level",
+    type=float,
+    default=0.95,
+    show_default=True,
+    help="Level of the intervals.",
+)
 _figures = click.option(
     "--figures",
     "folder",
@@ -197,9 +203,7 @@ def friction(
     "fitted",
 )
 @_term("--drift", "Drift of the offset, N·m/s; fitted for each trial.")
-@_term(
-    "--lag", "Time constant of the torque sensor, s; below 0 the angle is late by it."
-)
+@_term("--lag", "Time constant of the torque sensor, s; below 0, delay of the angle.")
 @_term("--rise", "Time that a catch takes to reach its peak, s.")
 @click.option(
     "--compare",
@@ -229,9 +233,9 @@ def fit(
 
     A recording is a CSV file or an npz archive with time, angle and torque, and with
     the unit in each column's name (time_s, angle_deg, torque_nm). It may also be a
-    recording of masrel run, of which the measured torque is used or, if there is none,
-    the model's. Prints every parameter with its confidence interval (clustered by
-    trial), the parameters that these trials do not determine, and whether the law fits.
+    recording of masrel run: the measured torque is used, or the model's if none was
+    measured. Prints every parameter with its confidence interval (clustered by trial),
+    the parameters that these trials do not determine, and whether the law fits.
     """
     slow_below = of_joint["slow_below"]
     if slow_below is not None and not 0.0 < slow_below < math.inf:
@@ -240,8 +244,8 @@ def fit(
         )
     if compare and laws is not None:
         raise ParameterError(
-            "--compare, --laws: one compares terms of the arm, the other laws; needs "
-            "one of them, got both"
+            "--compare, --laws: the first compares terms of the arm, the second laws; "
+            "needs one of them, got both"
         )
     with warnings_as_notes():
         movements = recordings.read(of_device=False, quiet=output.quiet)

@@ -101,9 +101,10 @@ _OF_JUDGES = (
     Column(key="reason", heading="Reason", where="csv"),
 )
 _JUDGED = (
-    "Not worse: humans who are shown to be better than the judge by less than ε, if at "
+    "Not worse: number of humans who are better than the judge by less than ε, if at "
     "all; half of them are enough (alternative annotator test). Advantage: how often "
-    "the judge is as close to the others as a human is, or closer; mean over humans."
+    "the judge is at least as close to the other humans as a human is, averaged over "
+    "humans."
 )
 _SHORT = ("title", "value", "interval_shown", "n_items", "n_raters")
 
@@ -289,7 +290,7 @@ def _with_table(
         in_sentences=False,
         data=material.data,
     ).notes
-    five = "Of many raters, five by their value; the file has all."
+    five = "Only five raters are shown, chosen by their value; the file has all."
     notes = (
         *(note for note in notes if not isinstance(note, Explanation)),
         *[_AGREEMENTS] * bool(earned),
@@ -388,7 +389,7 @@ def categories_section(material: Material) -> Iterator[Content]:
         notes=(
             "Agreement: how often a grade that one rater gave was also given by "
             f"another rater of the model. Interval: its {percent(level)} % confidence "
-            "interval for these raters on other models like these. κ: Fleiss', of the "
+            "interval for these raters on other models like these. κ: Fleiss' κ of the "
             "grade against all others.",
         ),
         data=material.data,

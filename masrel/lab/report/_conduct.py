@@ -192,8 +192,8 @@ def conduct_section(material: Material) -> Iterator[Content]:
     yield from (Paragraph(text=text) for text in conduct.remarks)
     if left_out := "; ".join(_left_out(material, conduct)):
         yield Paragraph(
-            text=f"Left out: {left_out}. masrel report shows each with --include and "
-            "the word in parentheses."
+            text=f"Not shown: {left_out}. To show one, add --include and the word in "
+            "parentheses to masrel report."
         )
 
 
@@ -203,8 +203,8 @@ def _device_calibration(material: Material, conduct: StudyConduct) -> Iterator[C
         calibration, _ = conduct.calibration
         yield Paragraph(
             text=f"{'SIMULATED: ' * calibration.simulated}calibration of the device, "
-            f"{device}, on {calibration.time_utc:%Y-%m-%d}, with intervals of 95 %: "
-            f"{'; '.join(calibration.lines)}. Gain of torque from "
+            f"{device}, on {calibration.time_utc:%Y-%m-%d}, with 95 % intervals: "
+            f"{'; '.join(calibration.lines)}. Torque gain from "
             f"{calibration.gain_from or 'nothing: it was not measured'}."
         )
     elif any(not session.simulated for session in conduct.begun):
@@ -247,15 +247,15 @@ def _flow_table(material: Material, conduct: StudyConduct) -> Table:
     flows = [(of or "study", _flow(material, conduct, of)) for of in (*sessions, None)]
     return Table(
         name="rater_flow",
-        caption="Raters, from planned to analysed",
+        caption="Number of raters, from planned to analysed",
         columns=(
             Column(key="session", heading="Session", align="left"),
             *(Column(key=key, heading=key.capitalize()) for key in flows[0][1]),
         ),
         rows=tuple((name, *map(len, flow.values())) for name, flow in flows),
         notes=(
-            "study: complete in all sessions. Late: joined after the site's first draw "
-            "of schedules. Analysed: with a grade, not excluded.",
+            "Complete in the row study: complete in all sessions. Late: joined after "
+            "the site's first draw of schedules. Analysed: with a grade, not excluded.",
         ),
         data=material.data,
     )
@@ -316,7 +316,7 @@ def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Tabl
         measures |= {"least": "Min", "most": "Max"}
         yield Table(
             name="rater_numbers",
-            caption="What is known of the raters who are analysed: numbers",
+            caption="Characteristics of the analysed raters: numbers",
             columns=(
                 Column(key="field", heading="Field", align="left"),
                 Column(key="n", heading="Raters"),
@@ -329,7 +329,7 @@ def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Tabl
     if counts:
         yield Table(
             name="rater_counts",
-            caption="What is known of the raters who are analysed",
+            caption="Characteristics of the analysed raters",
             columns=(
                 Column(key="field", heading="Field", align="left"),
                 Column(key="value", heading="Value", align="left"),
@@ -354,7 +354,7 @@ def _events_table(material: Material, conduct: StudyConduct) -> Table:
     names = {key: key.capitalize() for key in keys}
     return table_of(
         "events",
-        "What happened beside the sessions, in order of time",
+        "Other events of the study, in chronological order",
         [*_columns(names | {"who": "By"} if _WHO in conduct.include else names)],
         [
             {
@@ -407,15 +407,15 @@ def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
         columns,
         [asdict(each) for each in conduct.corrections],
         notes=(
-            "Each correction in order of time, the last one of a presentation counts; "
-            "First: as the rater gave it; –: no grade.",
+            "Corrections are in chronological order; the last one of a presentation "
+            "counts. First: the grade that the rater gave; –: no grade.",
         ),
         data=material.data,
     )
 
 
 def _changes_table(material: Material, conduct: StudyConduct) -> Table:
-    names = {"key": "Of the plan", "before": "Before", "after": "After"}
+    names = {"key": "Key", "before": "Before", "after": "After"}
     names["recorded"] = "Recorded"
     return table_of(
         "plan_changes",

@@ -46,16 +46,16 @@ _CONSTANTS = {
     "catch_rise_s": ("ΔT_rise", "rise of the catch to its peak (s)"),
     "start_deg": ("θ_start", "start of a stretch (deg)"),
     "range_end_deg": ("θ_end", "end of the range of motion (deg)"),
-    "post_catch": ("τ post-catch", "reading of the torque after the catch"),
-    "residual_reading": ("Q", "reading of Q"),
+    "post_catch": ("τ post-catch", "definition of the torque after the catch"),
+    "residual_reading": ("Q", "definition of Q"),
 }
 
-# The constants that are no numbers but the name of a variant.
+# The constants that are not numbers but the name of a variant.
 _VARIANT_NAMES = {
-    "continuous": "continuous: from the residual torque on",
-    "additive": "additive: to the torque of pre-catch",
-    "residual": "residual over peak torque",
-    "decrease": "decrease after the peak over the rise",
+    "continuous": "continuous: continues from the residual torque",
+    "additive": "additive: added to the torque before the catch",
+    "residual": "residual torque divided by the peak",
+    "decrease": "decrease after the peak divided by the rise",
 }
 
 # What the table of shared constants leaves out where no model departs from it.
@@ -150,9 +150,9 @@ def _constants(material: Material) -> Iterator[Table]:
         for key, value in msgspec.structs.asdict(model.constants).items()
         if value not in (None, values[key])
     ]
-    caption = "Constants all models share"
+    caption = "Constants shared by all models"
     if any(model.kind != DEFAULT_KIND for model in protocol.models):
-        caption = "Constants all spastic elbows share"
+        caption = "Constants shared by all spastic elbows"
     yield Table(
         name="constants",
         caption=caption + ", except those in the table below" * bool(single),
@@ -163,7 +163,7 @@ def _constants(material: Material) -> Iterator[Table]:
     if single:
         yield Table(
             name="own_constants",
-            caption="Constants that single models have of their own",
+            caption="Constants specific to single models",
             columns=(MODEL, *_CONSTANT_COLUMNS),
             rows=tuple(single),
             data=material.data,
@@ -171,7 +171,7 @@ def _constants(material: Material) -> Iterator[Table]:
 
 
 def _other_kinds(material: Material) -> Iterator[Table]:
-    # every number of the models that are no spastic elbows, if there are any
+    # every number of the models that are not spastic elbows, if there are any
     others = [m for m in material.protocol.models if m.kind != DEFAULT_KIND]
     numbers = (
         "; ".join(
@@ -181,10 +181,10 @@ def _other_kinds(material: Material) -> Iterator[Table]:
         for model in others
     )
     if others:
-        heading = "Numbers, by the keys of the protocol"
+        heading = "Parameters, by their keys in the protocol"
         yield Table(
             name="other_kinds",
-            caption="Models of other kinds than the spastic elbow",
+            caption="Models other than spastic elbows",
             columns=(
                 MODEL,
                 Column(key="kind", heading="Kind", align="left"),
@@ -224,7 +224,7 @@ def _sessions(material: Material) -> Table:
         shown.append((session.id, n_raters, ", ".join(raters), *cells))
     return Table(
         name="sessions",
-        caption="Sessions, their raters, and how many ratings there are",
+        caption="Sessions, raters and number of ratings",
         columns=(
             Column(key="session", heading="Session", align="left"),
             Column(key="n_raters", heading="Raters"),

@@ -70,7 +70,11 @@ SECTIONS: dict[str, tuple[str, str, Callable[[Material], Iterable[Content]]]] = 
     "grades": ("Grades", "Tables of grades", grades_section),
     "categories": ("", "Agreement on each grade", categories_section),
     "intended": ("", "Agreement with the intended grade", intended_section),
-    "confusion": ("Where raters disagree", "Grades by intended one", confusion_section),
+    "confusion": (
+        "Where raters disagree",
+        "Grades by intended grade",
+        confusion_section,
+    ),
     "test-retest": ("Reliability over time", "Test-retest agreement", retest_section),
     "in-person": ("", "In-person and haptic grades", in_person_section),
     "order": ("", "Effects of order", order_section),

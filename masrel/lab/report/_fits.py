@@ -54,16 +54,17 @@ def fit_table(fit: ElbowFit | FrictionFit) -> Table:
             fit.lack_of_fit.sentence,
             f"{slow} slow and {len(fit.trials) - slow} fast trials; intervals are "
             "clustered by trial.",
-            f"Slow trials differ from (1) by {error} of their mean torque; all trials "
-            f"from the law by {number(fit.torque_sd, 3)} N·m (standard deviation).",
-            "The column of a step takes what earlier steps found as known.",
-            "--laws all compares this law with laws of tone.",
+            f"Torque in slow trials differs from equation (1) by {error} of its mean "
+            "on average; the residual of all trials has a standard deviation of "
+            f"{number(fit.torque_sd, 3)} N·m.",
+            "Step alone: estimate of one step, which treats earlier results as known.",
+            "To compare this law with other laws of tone, add --laws all.",
             *fit.remarks,
         )
     else:
         notes = (
             f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",
-            f"Torque differs from (7) by {error} of its mean.",
+            f"Torque differs from equation (7) by {error} of its mean on average.",
         )
     return Table(
         name="joint" if is_joint else "friction",
@@ -90,22 +91,25 @@ def _data_of(fit: ElbowFit | FrictionFit) -> str:
 
 
 def residual_tables(fit: ElbowFit | FrictionFit) -> tuple[Table, ...]:
-    """Return the table of what a fitted joint leaves of the torque, phase by phase."""
+    """Return the table of the residual torque of a fitted joint, phase by phase."""
     if not isinstance(fit, ElbowFit):
         return ()
     lack = fit.lack_of_fit
     notes = [
-        "Runs of one sign over those that independent samples would have; "
-        "autocorrelation of neighbouring samples."
+        "Runs: number of runs of one sign, divided by the number expected for "
+        "independent samples. Autocorrelation: between neighbouring samples."
     ]
     if not math.isnan(lack.after_to_before):
         ratio = number(lack.after_to_before, 2)
-        notes.append(f"From the catch on {ratio} times what is left before it.")
+        notes.append(
+            f"The residual after the onset of the catch is {ratio} times that before "
+            "it."
+        )
     if not math.isnan(lack.rest_sd):
-        notes.append(f"Noise at rest {number(lack.rest_sd, 3)} N·m.")
+        notes.append(f"Noise at rest: {number(lack.rest_sd, 3)} N·m.")
     table = Table(
         name="residuals",
-        caption="What is left of the torque",
+        caption="Residual torque by phase",
         columns=(
             Column(key="phase", heading="Phase", align="left"),
             Column(key="n_samples", heading="Samples"),
@@ -154,10 +158,11 @@ def comparison_tables(compared: Sequence[ComparedFit]) -> tuple[Table, ...]:
         Column(key="chosen", heading="", align="left"),
     )
     notes = (
-        "Error: root mean square distance of a trial's torque from what the parameters "
-        "of all other trials give, with its own constant, peak, residual and travel.",
-        "Worse: mean square distance less that of the best fit, with its standard "
-        "error over trials; chosen is the first that is within one of the best.",
+        "Error: root mean square error of a trial's torque predicted from the "
+        "parameters of all other trials, with the trial's own constant, peak, residual "
+        "and travel.",
+        "Worse: mean square error minus that of the best fit, with its standard error "
+        "over trials. The first fit within one standard error of the best is chosen.",
         *(f"{_with_text(each)}: {each.reason}" for each in compared if each.reason),
     )
     return (
@@ -210,7 +215,7 @@ def law_tables(laws: LawComparison | None) -> tuple[Table, ...]:
     columns = (
         Column(key="law", heading="Law", align="left"),
         Column(key="n_parameters", heading="Parameters"),
-        Column(key="rms", heading="Left (N·m)"),
+        Column(key="rms", heading="Residual (N·m)"),
         Column(key="error", heading="Error (N·m)"),
         Column(key="worse", heading="Worse (10⁻³ N²·m²)"),
         Column(key="worse_se", heading="SE"),
@@ -228,11 +233,11 @@ def law_tables(laws: LawComparison | None) -> tuple[Table, ...]:
     )
     notes = (
         laws.sentence,
-        f"{len(laws.recordings)} recordings, which weigh the same; beside its "
-        "parameters each law has a constant of its own in each.",
-        "Left: root mean square of the torque after the fit. Error: of the torque of a "
-        "recording predicted from all others.",
-        "Worse: mean square error less that of the best law, with its standard error "
+        f"{len(laws.recordings)} recordings with equal weight; in addition to its "
+        "parameters, each law has one constant per recording.",
+        "Residual: root mean square of the torque after the fit. Error: root mean "
+        "square error of a recording's torque predicted from all other recordings.",
+        "Worse: mean square error minus that of the best law, with its standard error "
         "over recordings.",
         *(f"{each.name}: {each.reason}" for each in laws.fits if each.reason),
     )

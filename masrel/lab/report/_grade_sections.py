@@ -72,8 +72,8 @@ def felt_sentences(material: Material) -> str:
         sentences.append(
             f"In {n_slow} of {counted(made.n_presentations, 'presentation')} the "
             "stretches were too slow to feel the catch: none reached ν_th in "
-            f"{made.n_below_threshold}, and none came to the catch that the model has "
-            f"at that speed in {made.n_no_catch}."
+            f"{made.n_below_threshold}, and none came as far as the model's catch at "
+            f"that speed in {made.n_no_catch}."
         )
     if made.n_grip_lost:
         sentences.append(
@@ -211,7 +211,7 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
         notes=(*grid.notes, "The file has the grades of every rater."),
         data=material.data,
     )
-    text += ". Darker is more often, of the grades of the model"
+    text += ". Darker: a larger share of the model's grades"
     text += "; the intended grade is framed" * grid.has_aims
     framed = np.array(grid.aims)[:, None] == every
     pictured = (counts, grid.models, grades, framed, ("model", "grade given"))
@@ -224,7 +224,7 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     )
 
 
-_TOO_SLOW = "Grades of stretches that never reached ν_th are not as intended."
+_TOO_SLOW = "Grades after stretches that never reached ν_th do not count as intended."
 
 
 def intended_section(material: Material) -> Iterator[Content]:
@@ -282,7 +282,7 @@ def in_person_section(material: Material) -> Iterator[Content]:
     yield Table(
         name="in_person",
         caption=(
-            "Grade of the patient in person and of the model built from that patient, "
+            "Grades of the patient in person and of the model built from that patient, "
             f"by the same rater (session {result.session})"
         ),
         columns=(
@@ -353,8 +353,9 @@ def confusion_section(material: Material) -> Iterator[Content]:
     counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
     framed = np.array([[grade == aim for grade in grades] for aim in intended])
     yield Paragraph(
-        text=f"Of {counted(int(counts.sum()), 'grade')} of models with an "
-        f"intended grade, {counts[framed].sum()} are the intended one."
+        text=f"Models with an intended grade received "
+        f"{counted(int(counts.sum()), 'grade')}, of which {counts[framed].sum()} are "
+        "as intended."
     )
     texts = [
         f"intended {aim}: "
@@ -365,7 +366,7 @@ def confusion_section(material: Material) -> Iterator[Content]:
     yield Drawing(
         name="confusion",
         caption=(
-            f"{caption}. Darker is a larger part of the row; the intended grade is "
+            f"{caption}. Darker: a larger share of the row; the intended grade is "
             "framed."
         ),
         alt=f"Counts of grades given. {'; '.join(texts)}.",
@@ -412,8 +413,8 @@ _RECONSTRUCTED = (
 )
 
 _WITHHELD = (
-    f"Where fewer than {FEWEST_RATERS} raters answered a question that is not public, "
-    "only n is shown: more could show what one of them answered."
+    f"If fewer than {FEWEST_RATERS} raters answered a question that is not public, "
+    "only n is shown, because more could reveal what one of them answered."
 )
 
 _QUESTIONS = (

@@ -201,9 +201,9 @@ def order_section(material: Material) -> Iterator[Content]:
     if places := place_rows(protocol, ratings):
         yield Table(
             name="grades_by_place",
-            caption="Grades by the place of the presentation in its session",
+            caption="Grades by the position of the presentation in its session",
             columns=(
-                Column(key="places", heading="Places", align="left"),
+                Column(key="places", heading="Positions", align="left"),
                 Column(key="session", heading="Session", align="left"),
                 Column(key="n_ratings", heading="Ratings"),
                 Column(key="deviation_steps", heading="Mean difference", digits=2),
@@ -217,7 +217,7 @@ def order_section(material: Material) -> Iterator[Content]:
         yield Paragraph(text=sentence("order", "no_places"), absent=True)
     yield Table(
         name="order_effects",
-        caption="Differences of grades by order",
+        caption="Differences between grades by order",
         columns=(
             Column(key="effect", heading="Difference", align="left"),
             Column(key="n_raters", heading="Raters"),
@@ -241,7 +241,7 @@ def order_section(material: Material) -> Iterator[Content]:
 
 
 _CONCEALED = (
-    "Not for raters: it names the models, and counts of few schedules give orders away."
+    "Not for raters: this names the models, and counts of few schedules reveal orders."
 )
 _MAX_COLUMNS = 16  # of places or models
 _N_PARTS = 8  # of a session with more places
@@ -258,8 +258,8 @@ def summary_table(balances: Sequence[_OrderBalance]) -> Table:
             Column(key="session", heading="Session", align="left"),
             *site,
             Column(key="n_schedules", heading="Schedules"),
-            Column(key="n_places", heading="Places"),
-            Column(key="in_a_place", heading="Model in a place"),
+            Column(key="n_places", heading="Positions"),
+            Column(key="in_a_place", heading="Model in a position"),
             Column(key="ordered_pair", heading="Ordered pair"),
             Column(key="twice_in_a_row", heading="Model twice in a row"),
             Column(key="model_run", heading="Run of a model"),
@@ -283,9 +283,10 @@ def summary_table(balances: Sequence[_OrderBalance]) -> Table:
         ),
         read=(_CONCEALED,),
         notes=(
-            "How often a model has one place of the session, and how often one model "
-            "follows another: fewest to most. Twice in a row: schedules in "
-            "which a model follows itself. Runs: the longest of any schedule.",
+            "How often a model has one position in the session, and how often one "
+            "model follows another: fewest to most. Twice in a row: number of "
+            "schedules in which a model follows itself. Runs: the longest in any "
+            "schedule.",
         ),
         data="recorded",
     )
@@ -309,7 +310,7 @@ def count_tables(balance: _OrderBalance) -> Iterator[Table]:
     parts = list(pairwise(n_places * part // n_parts for part in range(n_parts + 1)))
     yield Table(
         name="places",
-        caption=f"How often each model is in each place, {of_session}",
+        caption=f"How often each model is in each position, {of_session}",
         columns=(
             Column(key="model", heading="Model", align="left"),
             *(Column(key=f"p{a}", heading=_part(a, b)) for a, b in parts),
@@ -323,7 +324,7 @@ def count_tables(balance: _OrderBalance) -> Iterator[Table]:
     if len(balance.models) <= _MAX_COLUMNS:
         yield Table(
             name="pairs",
-            caption=f"How often each model comes right after another, {of_session}",
+            caption=f"How often each model directly follows another, {of_session}",
             columns=(
                 Column(key="first", heading="First", align="left"),
                 *(Column(key=model, heading=model) for model in balance.models),

@@ -405,14 +405,14 @@ def _measured_drawing(
     return Drawing(
         name=f"measured_{nth}",
         caption=(
-            f"Torque that the device's sensor measured of {listed} (line), and torque "
-            "that was sent (dashed), above the angle: of the first presentation of "
-            "each the first stretch that was fast enough for a catch. The measured "
-            "torque also has the device's friction and the inertia of its motor, and "
-            "what was sent has the compensation of friction taken off."
+            f"Torque of {listed} measured by the device's sensor (line) and commanded "
+            "torque (dashed), above the angle: the first stretch of the first "
+            "presentation of each that was fast enough for a catch. The measured "
+            "torque includes the device's friction and the inertia of its motor; the "
+            "friction compensation was subtracted from the commanded torque."
         ),
         alt=(
-            f"Measured and sent torque against time for {listed}; the largest "
+            f"Measured and commanded torque against time for {listed}; the largest "
             f"measured torque is {number(largest, 1)} N·m."
         ),
         content=Drawn(FIGURES + "_stretch_figures:measured_figure", (panels,)),

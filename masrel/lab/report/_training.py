@@ -90,14 +90,14 @@ def training_tables(record: TrainingRecord, *, level: float) -> tuple[Table, Tab
             f"κ with the intended grades, {criterion.weights} weights, of the last "
             f"{CURVE_SETS * criterion.n_models} presentations; each interval holds "
             "separately.",
-            f"Passed at evidence {number(record.boundary, 2)}: the largest, of all "
-            f"runs of at most {criterion.window} presentations up to the last, of "
-            f"their number times what κ has above {criterion.reference}.",
-            f"Of raters whose κ stays at {criterion.insufficient}, at most "
-            f"{number(100.0 * record.false_pass, 1)} % pass; of raters whose κ is at "
-            f"{criterion.sufficient} from the start, at most "
-            f"{number(100.0 * record.false_fail, 1)} % fail, as measured on simulated "
-            "trainees.",
+            f"Passed once the evidence reaches {number(record.boundary, 2)}. Evidence: "
+            f"the largest value, over all runs of at most {criterion.window} "
+            "presentations up to the last, of their number times the excess of κ over "
+            f"{criterion.reference}.",
+            f"At most {number(100.0 * record.false_pass, 1)} % of raters whose κ stays "
+            f"at {criterion.insufficient} pass; at most "
+            f"{number(100.0 * record.false_fail, 1)} % of raters whose κ is "
+            f"{criterion.sufficient} from the start fail (simulated trainees).",
             NOT_RATINGS,
         ),
         data=data,

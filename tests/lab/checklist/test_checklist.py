@@ -131,7 +131,7 @@ def test_what_nobody_knows_before_the_first_session_is_asked(small: Small) -> No
     checklist = grras(small[0])
     asked = {item.number for item in checklist.items if item.state == "authors"}
     assert asked == {"1", "3", "5", "11", "13", "14", "15"}
-    assert checklist.notes == ("No session has begun: what follows is the plan.",)
+    assert checklist.notes == ("No session has begun yet; this is the plan.",)
 
 
 def test_raters_who_left_are_said_and_not_by_whom(rated: Small) -> None:
@@ -167,7 +167,7 @@ def test_public_fields_of_raters_are_told(new_study: Callable[..., Small]) -> No
     for number in ("4", "12"):
         said = facts(grras(study), number)
         assert "Years of practice: 3 to 8 a, median 5.5." in said
-        assert "Kept, and not public: illness." in said
+        assert "Recorded but not public: illness." in said
         assert "influenza" not in said
 
 

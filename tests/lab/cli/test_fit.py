@@ -79,7 +79,7 @@ def test_laws_are_compared_where_the_elbows_own_is_refused(
     assert document["laws_sentence"].startswith("spring-damper predicts left-out")
     both = masrel("joint", "fit", *fast, "--laws", "all", "--compare")
     assert both.code == 2
-    assert "--compare, --laws: one compares terms of the arm" in both.err
+    assert "--compare, --laws: the first compares terms of the arm" in both.err
 
 
 def test_slow_trials_alone_are_shown_and_make_no_model_file(

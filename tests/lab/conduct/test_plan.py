@@ -126,7 +126,7 @@ def test_changes_are_in_the_analysis_the_checklist_and_the_export(
     for text in (Path(f"{out}.md").read_text(), (out / "README.md").read_text()):
         assert text.replace("\\", "").count(f"{change}.") >= 1
     page = Path(f"{out}.md").read_text()
-    assert f"since its first draw on {drawn.time_utc[:10]}" in page
+    assert f"at the first draw of schedules on {drawn.time_utc[:10]}" in page
     assert str(drawn.fields["protocol_sha256"]) in page
 
 

@@ -17,4 +17,4 @@ def test_the_report_and_every_table_say_simulated(small_demo: Path) -> None:
     assert analysis["simulated"] is True
     _, conduct = (report / "report.md").read_text().split("## Conduct\n")
     assert "| 2012-01-01 | adverse-event | R1 | test | simulated: sore " in conduct
-    assert "**Simulated data.** What happened beside the sessions" in conduct
+    assert "**Simulated data.** Other events of the study" in conduct

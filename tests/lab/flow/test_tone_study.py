@@ -63,7 +63,7 @@ def test_its_report_has_traces_and_numbers_of_every_kind(rated: StudyPaths) -> N
     assert others == {m: kind for m, kind in kinds.items() if kind != "spastic-elbow"}
     assert [row["model"] for row in shown["peak_torque"]] == list(kinds)
     page = (report / "report.md").read_text(encoding="utf-8")
-    assert "Constants all spastic elbows share" in page
+    assert "Constants shared by all spastic elbows" in page
     assert len(list((report / "figures").glob("traces_*.png"))) == 3
 
 

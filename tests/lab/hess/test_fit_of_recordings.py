@@ -134,13 +134,13 @@ def test_a_fit_says_which_torque_it_took(
         write_recording(without_sensor(read_recording(path)), copy)
     of_model = fit(bare)
     assert of_model.remarks[0] == (
-        "Torque of 9 of 9 recordings: what the joint model asked for, not measured"
+        "The torque of 9 of 9 recordings was commanded by the joint model, not measured"
     )
     assert of_model["damping"].value == pytest.approx(1.26, rel=0.005)
     both = fit([*recordings[:4], *bare[4:]])
     assert [remark[:20] for remark in both.remarks[:2]] == [
-        "Torque of 4 of 9 rec",
-        "Torque of 5 of 9 rec",
+        "The torque of 4 of 9",
+        "The torque of 5 of 9",
     ]
 
 
@@ -159,7 +159,7 @@ def test_presentations_of_two_models_are_not_fitted_as_one(tmp_path: Path) -> No
         recording = measured(STANDARD_MODELS[model], stretch(90.0))
         facts = {**recording.facts, "model": model}
         write_recording(replace(recording, facts=facts), path)
-    with pytest.raises(RecordingError, match=r"one model, .* got some of HM1, HM2"):
+    with pytest.raises(RecordingError, match=r"one model; .* name HM1, HM2"):
         fit(paths)
 
 
@@ -179,5 +179,5 @@ def test_what_is_measured_beyond_what_was_sent_is_the_device(
 def test_without_a_sensor_nothing_tells_of_the_device(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     write_recording(without_sensor(measured(NOTHING, to_and_fro(60.0))), path)
-    with pytest.raises(RecordingError, match=f"needs the column {MEASURED}: what a"):
+    with pytest.raises(RecordingError, match=f"needs the column {MEASURED}: only a"):
         fit_friction([path])

@@ -135,7 +135,7 @@ def test_what_is_private_is_shown_when_it_is_asked_for(
     assert "action: ice" in asked
     assert "all codes; an injury" in asked
     assert "knew the models" in asked
-    assert "Left out" not in asked
+    assert "Not shown" not in asked
 
 
 def test_a_report_of_before_the_last_event_is_found(

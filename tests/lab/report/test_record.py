@@ -83,15 +83,15 @@ def elsewhere(study: Study) -> Path:
     return file
 
 
-PROGRAM = "a program in the place of 2 raters graded the models in a random order"
-BLIND = "knew them by codes alone"
+PROGRAM = "a program instead of 2 raters graded the models in a random order"
+BLIND = "saw only their codes"
 CASES = {
     "all sessions by a program": Case(
         ("SIMULATED DATA: no person gave these grades.", PROGRAM,
          "In session test, 2 of 2 raters completed all 3 presentations",
          "a simulated hand stretched the arm 1.0 times a presentation",
          "In session retest, 1 of 1 rater completed all 3 presentations",
-         "drawn with a secret that is not published", "No unblinding is on record.",
+         "drawn with a secret that is not published", "No unblinding is recorded.",
          "\nSimulated data.\n", "stamp='SIMULATED DATA')"),
         never=(BLIND, "INTERIM", "practice", "break", "the plan was changed"),
     ),
@@ -122,28 +122,28 @@ CASES = {
     ),
     "a person instead of a program": Case(
         ("SIMULATED DEVICE: persons gave these grades, 3 of 3 on the simulated device",
-         "1 rater met the models in a random order, drawn beforehand, and knew them by "
-         "codes alone", "raters stretched the arm 1.0 times", "In session test, 1 of 2 "
-         "raters completed all 3 presentations", "stamp='SIMULATED DEVICE, INTERIM')"),
+         "1 rater received the models in a random order, drawn beforehand, and saw "
+         "only their codes", "raters stretched the arm 1.0 times", "In session test, 1 "
+         "of 2 raters completed all 3 presentations", "stamp='SIMULATED DEVICE, INTERIM')"),
         never=("a program", "SIMULATED DATA"), of="drawn", then=by_a_person,
     ),
     "a person and a program": Case(
         ("SIMULATED DATA: 3 of 6 grades are a program's, 3 by persons on the simulated "
-         "device.", "1 rater met the models", "a program in the place of 1 rater grad"),
+         "device.", "1 rater received the models", "a program instead of 1 rater grad"),
         of="of another scheme", n_run=1, then=by_a_person,
     ),
     "on paper": Case(
-        ("wrote grades on sheets that have codes alone, in a random order, drawn "
-         "beforehand; what was presented to them is not on record", "stamp='INTERIM')",
+        ("wrote grades on sheets with only codes, in a random order, drawn "
+         "beforehand; what was presented to them is not recorded", "stamp='INTERIM')",
          "Study three, recorded ratings."),
         never=(BLIND, "stretched", "SIMULATED"), of="drawn", then=on_paper,
     ),
     "ratings from elsewhere": Case(
         ("In session test, 2 raters graded 2 standard models (4 grades, none missing)",
          "The data are 4 grades of 2 haptic models by 2 raters in session test",
-         "The ratings come from the file other.csv and not from session logs: how they "
-         "were collected is not on record. The protocol plans 3 haptic models (2 "
-         "standard, 1 dummy), 2 raters and 2 sessions, in which each rater is to meet"),
+         "The ratings come from the file other.csv and not from session logs, so how "
+         "they were collected is not recorded. The protocol plans 3 haptic models (2 "
+         "standard, 1 dummy), 2 raters and 2 sessions, in which each rater is"),
         never=(BLIND, "completed", "INTERIM", "drawn", "In session retest"),
         of="drawn", then=elsewhere,
     ),
@@ -162,7 +162,7 @@ CASES = {
         include=("who", "notes"),
     ),
     "a withdrawn rater": Case(
-        ("R1 withdrew; grades given until then count.",),
+        ("R1 withdrew; grades given before that count.",),
         never=("INTERIM",), n_run=2,
         then=lambda study: conduct.record_standing(*study, "R1", "withdrawn", **BY),
     ),

@@ -121,7 +121,7 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     "counts, in the singular and plural": (
         study(sections=DESIGN), table_v(),
         ["The protocol plans 16 haptic models (4 standard, 12 dummies), 8 raters and 2",
-         "Before each grade a rater may stretch the arm as often as wanted. Scale ",
+         "Raters may stretch the arm as often as they want before each grade. Scale ",
          "No ratings in these data: session retest.",
          f"Models without ratings in these data: {DUMMIES}."],
     ),
@@ -135,23 +135,24 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     ),
     "orders of a Williams design": (
         study(sections=DESIGN, schedule={"scheme": "williams"}), table_v(),
-        ["is to meet the models in an order of a Williams design"],
+        ["is presented with the models in an order of a Williams design"],
     ),
     "orders with rules": (
         study(sections=DESIGN, schedule=APART), table_v(),
-        ["to meet the models in an order drawn from all in which no two standards come "
-         "in a row and at most 2 of one grade come in a row and to know them by codes"],
+        ["with the models in an order drawn from all in which no two standards come "
+         "in a row and at most 2 of one grade come in a row and sees only their codes"],
     ),
     "stretches, practice and breaks": (
         study(sections=DESIGN, presentation=CUES, occasions=BREAKS), table_v(),
-        ["as told: slow (V1, at most ", ", then fast (V3, at least ",
-         "is to begin with practice on HM1, not rated. A break of 3 min is to come "
+        ["as follows before each grade: slow (V1, at most ",
+         ", then fast (V3, at least ",
+         "begins with practice on HM1, which is not rated. A break of 3 min is planned "
          "after every 2 presentations."],
     ),
     "default laws": (
         with_laws({}, {}), table_v(),
-        ["Q: residual over peak torque of the catch;", "Constants all models share\n",
-         "| θ_end |"],
+        ["Q: residual torque of the catch divided by its peak;",
+         "Constants shared by all models\n", "| θ_end |"],
     ),
     "other laws": (
         with_laws(
@@ -159,26 +160,26 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
             {"catch_rise_s": 0.03, "post_catch": "additive", "damping_nms_rad": 1.26},
         ), table_v(),
         ["Q: decrease after the peak of the catch", "| θ_rest |",
-         "| reading of Q | decrease after the peak over the rise |",
+         "| definition of Q | decrease after the peak divided by the rise |",
          "except those in the table below",
-         "after the catch | additive: to the torque of pre-catch |",
+         "after the catch | additive: added to the torque before the catch |",
          "| HM2 | ΔT_rise |"],
     ),
     "a law of one model": (
         with_laws({}, {"residual_reading": "decrease"}), table_v(),
-        ["Q: share of the peak of the catch, as each model reads it"],
+        ["Q: share of the peak of the catch, as each model defines it"],
     ),
     "a size, and what came": (
         sized({}), table_v(),
         ["With 6 items and 8 raters, the 95 % interval of Fleiss' κ",
          "assurance 0.700 of a half-width up to 0.25, if the coefficient is",
          "The data have 4 items and 8 raters; the interval's half-width is 0.306",
-         "more than the 0.250 that was wanted.",
+         "more than the required 0.250.",
          "models | planned | 6 | 8 | 0.600 | 0.243 | – | – | 0.700 | – |",
          "models | obtained | 4 | 8 | 0.626 | 0.306 | 0.320 | 0.933 | – | – |"],
     ),
     "a size that was expected": (
-        sized(EXPECTED), table_v(), ["no more than the 0.310 that was expected."],
+        sized(EXPECTED), table_v(), ["not more than the expected 0.310."],
     ),
     "a size without an interval": (
         sized({}, interval="none"), table_v(),
@@ -186,7 +187,7 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     ),
     "a size of nothing": (
         sized({}, models="dummy"), table_v(),
-        ["There is no such estimate: no dummy model has ratings"],
+        ["There is no estimate: no dummy model has ratings"],
     ),
     "no size": (
         study(sections=("sample-size",)), table_v(),
@@ -267,7 +268,7 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
              for rater, speed in (("R1", 80.0), ("R2", math.nan))],
             TWO.scale,
         ),
-        ["Ratings whose speed is not known: 1."],
+        ["Ratings with an unknown speed: 1."],
     ),
     "reconstructions": (
         study(sections=("traces",)), table_v(),
@@ -396,7 +397,7 @@ def test_methods_say_who_is_excluded_and_what_is_missing(tmp_path: Path) -> None
     protocol = study(plan(), sections=("methods", "categories"))
     text = page(written(tmp_path, protocol, rows, excluded=["R3"]))
     assert "2 of 8 raters graded 2 standard models" in text
-    assert "None of this counts the grades of R3, who is excluded.\n" in text
+    assert "The grades of R3, who is excluded, are not counted.\n" in text
     assert "R3 is excluded from every number." in text
     assert "are missing (1 of Fleiss' κ, standard models)" in text
     assert "specific agreement (Cicchetti & Feinstein, 1990)" in text
@@ -457,7 +458,7 @@ def test_measured_torque_is_of_the_first_recording_of_each_model(
     rows = simulated_ratings()
     files = written(tmp_path / "report", SENSOR, rows, recordings=folder)
     text = page(files)
-    assert "the device's sensor measured of HM1, HM2 (line)" in text
+    assert "Torque of HM1, HM2 measured by the device's sensor (line)" in text
     # of the second stretch, the first that could catch, and .25 s after it
     assert "the largest measured torque is 2.1 N·m" in text
     (svg,) = (p for p in files.figures if re.match(r"measured_1.*\.svg", p.name))

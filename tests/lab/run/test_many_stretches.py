@@ -151,7 +151,7 @@ def test_what_was_too_slow_is_said_to_the_rater_counted_and_graded_all_the_same(
     for words, text in (
         (["ratings"], "3 ratings followed stretches too slow to feel the catch"),
         (["analyze"], "In 3 of 3 presentations the stretches were too slow"),
-        (["report", "--quiet"], "none reached ν\\_th in 3, and none came to the catch"),
+        (["report", "--quiet"], "none reached ν\\_th in 3, and none came as far as"),
     ):
         output = CliRunner().invoke(cli, [*words, str(small[0].root)]).output
         if page.exists():

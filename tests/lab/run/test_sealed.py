@@ -216,7 +216,7 @@ def test_a_report_is_out_of_date_once_the_study_is_opened(sealed: Sealed) -> Non
     digest = hashlib.sha256(study.ratings_file.read_bytes()).hexdigest()
     assert manifest["inputs"]["ratings_sha256"] == digest
     pages = (study.report / "report.md").read_text(encoding="utf-8")
-    assert "Which models were met is sealed" in pages
+    assert "The models presented are sealed" in pages
     assert "| test | 2 | 2 | 2 |" in pages
     assert not verify_study(study).findings
     assert "next: masrel record unblind" in masrel("status", root)

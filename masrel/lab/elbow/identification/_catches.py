@@ -440,14 +440,14 @@ def fast_trial(stretch: Stretch, law: Law, instant: float | None = None) -> Tria
         return replace(none, remark="not used: a gap in the recording")
     catch = _catch(stretch, (onset, stop), law, instant)
     if catch is None:
-        return replace(none, remark="not used: no catch that stands out of the noise")
+        return replace(none, remark="not used: no catch stands out from the noise")
     first = int(np.searchsorted(samples.time, catch.time))
     before = filtered_part(samples.cut(slice(0, first)), _FAST_WINDOW)
     remark, after = "", None
     if samples.saturated[:stop].any():
         remark = "torque is saturated: nothing after the catch is used"
     elif before.time.size == 0:
-        remark = "it catches at once: no torque before the catch to compare with"
+        remark = "it catches at once, so there is no torque before it to compare with"
     else:
         after = _after(stretch, (first, stop), catch, law)
     return replace(none, pre_catch=before, after=after, catch=catch, remark=remark)

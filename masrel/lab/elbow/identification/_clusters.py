@@ -292,7 +292,7 @@ def fitted(
             reason = (
                 "an interval by trial needs two trials that differ"
                 if fit.n_trials[place] < 2
-                else "these trials fit exactly: an interval needs more that differ"
+                else "these trials fit exactly; an interval needs trials that differ"
             )
         estimates.append(
             FittedParameter(

@@ -105,22 +105,21 @@ def fit_friction(
     recordings : sequence of Movement or path
         The device moved to and fro by hand with its motor off; torque is what the
         hand exerts in the direction of extension. Or masrel's own recordings with a
-        measured torque, of which the torque that was sent is taken off.
+        measured torque, from which the commanded torque is subtracted.
     level : float, optional
         Level of the intervals.
 
     Returns
     -------
     FrictionFit
-        The three parameters. A recording has a constant of its own, the sensor's
-        zero; what a stroke in one direction does, the next does not repeat exactly,
-        so that strokes are the clusters.
+        The three parameters. Each recording has its own constant, the sensor's zero.
+        Strokes do not repeat exactly, so they are the clusters.
 
     Raises
     ------
     RecordingError
         If there are not two strokes in each direction, without which β cannot be
-        told from the sensor's zero.
+        distinguished from the sensor's zero.
 
     Warns
     -----
@@ -146,8 +145,8 @@ def fit_friction(
     for estimate in estimates:
         if estimate.value < 0.0:
             warn_caller(
-                f"{estimate.name} is negative ({estimate.value:.4g}): is torque that "
-                "of the hand, counted as the angle is?",
+                f"{estimate.name} is negative ({estimate.value:.4g}): is the torque "
+                "that of the hand, positive in the same direction as the angle?",
                 RecordingWarning,
             )
     left = [row.target - row.design @ fit.values for row in rows]

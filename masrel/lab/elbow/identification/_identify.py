@@ -1,6 +1,6 @@
-"""From recordings to a joint: what is read, what is refused, what is said of it.
+"""From recordings to a joint: what is read, what is refused, what is remarked.
 
-And which of what an arm may have makes a fit better: cross-validation over trials.
+And which terms of an arm make a fit better: cross-validation over trials.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, section II.
@@ -97,23 +97,23 @@ class ElbowFit:
     ----------
     estimates : tuple of FittedParameter
         Every parameter, from all trials together: those of the law, in the order of
-        the source's equations, and what else of an arm was fitted.
+        the source's equations, then the fitted terms of the arm.
     correlation : ndarray, shape (n_estimates, n_estimates)
-        Of the estimates' errors; ``nan`` where one is undefined.
+        Correlation of the estimates' errors; ``nan`` if an error is undefined.
     steps : tuple of Step
         The fits before the last, in their order.
     relative_error : float
-        Of slow trials: mean distance of torque from the law of step 1 over mean
-        torque, both absolute.
+        In slow trials, the mean absolute residual of the law of step 1 divided by the
+        mean absolute torque.
     torque_sd : float
-        Standard deviation of torque about the law in all trials, N·m.
+        Standard deviation of the residual torque in all trials, N·m.
     lack_of_fit : LackOfFit
-        Whether the law is that of these recordings.
+        Whether the law fits these recordings.
     cross_validation : ndarray, shape (n_trials,)
-        Per trial, the mean square distance of its torque from what the other trials'
-        parameters give, (N·m)²; ``nan`` where they do not determine one.
+        Per trial, the mean square error of its torque predicted from the other trials'
+        parameters, (N·m)²; ``nan`` if they do not determine one.
     trials : tuple of Trial
-        What was used.
+        The trials used.
     levels : tuple of CatchLevels
         Peak and residual of (3) as read off the torque, of each catch that has them.
     fitted_torque : tuple of ndarray
@@ -168,12 +168,12 @@ class ElbowFit:
         -------
         ElbowParameters
             The fitted values, with `constants` for all that was held. The weight and
-            the inertia of the arm and the lag of the sensor are no part of a joint.
+            the inertia of the arm and the lag of the sensor are not part of a joint.
 
         Raises
         ------
         ParameterError
-            If a parameter is undetermined, or a value is none that a joint can have.
+            If a parameter is undetermined, or a joint cannot have a value.
         """
         rise = self.arm["catch_rise"]
         values: dict[str, Any] = {} if isinstance(rise, str) else {"catch_rise": rise}
@@ -211,28 +211,27 @@ def fit(
         What is not fitted: ν_th, ν_L, θ_L, ΔT_peak, the end of range and the reading
         of (5). Those of Table III by default; its other values are not used.
     inertia : {"zero", "fitted"}, optional
-        Whether m of (1) is fitted, which the law has not in the catch. The paper has 0.
+        Whether m of (1) is fitted; the law has no m in the catch. The paper has 0.
     gravity : float or {"off", "fitted"}, optional
         Weight of the arm, m·g·l, N·m: it adds m·g·l·sin(θ - `gravity_angle`).
     gravity_angle : float, optional
-        Angle at which the weight has no torque, rad: the forearm hangs or stands there.
+        Angle at which the weight exerts no torque, rad: the forearm is vertical there.
     arm_inertia : float or {"off", "fitted"}, optional
         Inertia of the arm, kg·m², which acts in every phase.
     offset : float or {"off", "fitted"}, optional
         Constant torque of a trial above k·(θ - θ_rest), N·m: the sensor's zero. Fitted
-        for each trial by default. Fixed or off, the torque is that of a joint at rest
-        where its stretch starts, so that b can be told from speeds that differ between
-        trials.
+        for each trial by default. If it is fixed or off, the joint is taken to be at
+        rest where its stretch starts, so speeds that differ between trials identify b.
     drift : float or {"off", "fitted"}, optional
-        What the offset gains in a second, N·m/s; fitted for each trial.
+        Change of the offset per second, N·m/s; fitted for each trial.
     lag : float or {"off", "fitted"}, optional
-        Time constant of a torque sensor of first order, s; below 0, to -0.05, by how
-        much it is the angle that is late instead, as after another filter.
+        Time constant of a first-order torque sensor, s. A value below 0, down to
+        -0.05, means that the angle is late by that time instead, as after a filter.
     rise : float or {"off", "fitted"}, optional
-        How long the torque of a catch takes to its peak, s: `catch_rise`.
+        Time that the torque of a catch takes to reach its peak, s: `catch_rise`.
     slow_below : float, optional
-        A stretch whose speed stays below is slow, rad/s; ν_th by default, below which
-        nothing can catch.
+        A stretch whose speed stays below this is slow, rad/s; by default ν_th, below
+        which nothing can catch.
     level : float, optional
         Level of the confidence intervals.
 
@@ -247,17 +246,17 @@ def fit(
     ParameterError
         If an option is outside its range.
     RecordingError
-        If a recording is not usable, they are presentations of several models, there
-        is no slow stretch, the slow stretches do
-        not tell b from k, or what comes out cannot be the law: b or k below 0, or
-        Q of 1 or more, by more than their error; m or J by more than twice theirs.
+        If a recording is not usable, the recordings are of several models, no stretch
+        is slow, the slow stretches do not determine b and k, or the result
+        contradicts the law: b or k is below 0, or Q is 1 or more, by more than its
+        error; or m or J is below 0 by more than twice its error.
 
     Warns
     -----
     RecordingWarning
         If a recording or stretch is not used, or b or k comes out negative.
     SmallSampleWarning
-        If no more trials determine a parameter than it takes.
+        If there are too few trials for the interval of a parameter.
 
     References
     ----------
@@ -289,8 +288,8 @@ def fit(
     models = sorted({m.model for m in movements if m.model is not None})
     if len(models) > 1:
         raise RecordingError(
-            "recordings: a fit needs presentations of one model, which the .json "
-            f"beside each recording names; got some of {', '.join(models)}"
+            "recordings: a fit needs presentations of one model; the .json files "
+            f"beside the recordings name {', '.join(models)}"
         )
     stretches, rest_sd = _stretches(movements, options)
     slow = _slow_fit(stretches, options)
@@ -312,8 +311,8 @@ def fit(
     ]
     if lone:
         warn_caller(
-            f"{', '.join(lone)}: too few trials to say how trials differ; there is no "
-            "interval",
+            f"{', '.join(lone)}: too few trials to estimate how trials differ, so no "
+            "interval is given",
             SmallSampleWarning,
         )
     return result
@@ -378,12 +377,12 @@ def _stretches(
             warn_caller(f"{movement.name}: {words}", RecordingWarning)
         for stretch in here:
             if stretch.name in {other.name for other in stretches}:
-                raise RecordingError(f"{stretch.name}: the recording is there twice")
+                raise RecordingError(f"{stretch.name}: the recording was given twice")
             stretches.append(stretch)
     if not stretches:
         raise RecordingError(
             "recordings: none has an extension of 15 degrees or more; the angle must "
-            "grow with extension"
+            "increase with extension"
         )
     return stretches, float(np.median(noise)) if noise else math.nan
 
@@ -452,14 +451,15 @@ def _check_slow(
             raise RecordingError(_untold(estimate, errors[name], slow, options))
         if estimate.high < 0.0:
             raise RecordingError(
-                f"recordings: this is not the law: {symbol} is {estimate.value:.4g}, "
-                f"below 0 by more than its error (to {estimate.high:.4g}); torque must "
-                "resist extension, and the angle grow with it: are both signs right?"
+                f"recordings: the law does not apply: {symbol} is "
+                f"{estimate.value:.4g}, below 0 by more than its error (upper limit "
+                f"{estimate.high:.4g}); torque must resist extension, and the angle "
+                "must increase with it: are both signs right?"
             )
         if estimate.value < 0.0:
             warn_caller(
                 f"{symbol} is negative ({estimate.value:.4g}): torque must resist "
-                "extension, and the angle grow with it; are both signs right?",
+                "extension, and the angle must increase with it; are both signs right?",
                 RecordingWarning,
             )
 
@@ -474,17 +474,17 @@ def _untold(
     drifts = own_drifts(parts, options.gravity_angle)
     if "drift" not in options.fitted and drifts and drifts.p_value < LEVEL:
         return (
-            f"recordings: the slow stretches do not tell {symbol}: each drifts in "
-            f"its own way (p {p_text(drifts.p_value)}); try --drift fitted"
+            f"recordings: the slow stretches do not determine {symbol}: each has its "
+            f"own drift (p {p_text(drifts.p_value)}); try --drift fitted"
         )
-    remedy = "they need a speed that varies within a stretch"
+    remedy = "this takes a speed that varies within a stretch"
     if "offset" in options.fitted:
         remedy += (
-            ", or, at constant speeds that differ between stretches, a sensor whose "
+            ", or constant speeds that differ between stretches and a sensor whose "
             "zero is known (--offset)"
         )
     return (
-        f"recordings: the slow stretches do not tell {symbol} from a constant "
+        f"recordings: the slow stretches cannot distinguish {symbol} from a constant "
         f"torque; {remedy}"
     )
 
@@ -537,14 +537,14 @@ def _check_law(estimates: Sequence[FittedParameter]) -> None:
         refuse(
             (
                 name == "residual_ratio" and estimate.low >= 1.0,
-                f"recordings: this is not the law: Q is {value:.3g}, 1 or more beyond "
-                f"its error (from {estimate.low:.3g}): the torque does not fall from a "
-                "peak to a residual",
+                f"recordings: the law does not apply: Q is {value:.3g}, above 1 by "
+                f"more than its error (lower limit {estimate.low:.3g}): the torque "
+                "does not fall from a peak to a residual",
             ),
             (
                 value + most * (estimate.high - value) < 0.0,
-                f"recordings: this is not the law: {symbol} of all trials is "
-                f"{value:.4g}, below 0 by more than its error (to "
+                f"recordings: the law does not apply: {symbol} from all trials is "
+                f"{value:.4g}, below 0 by more than its error (upper limit "
                 f"{estimate.high:.4g}); are the signs of torque and angle right?",
             ),
             error=RecordingError,
@@ -557,7 +557,7 @@ def _reasons(last: JointFit, options: FitOptions) -> dict[str, str]:
         why = (
             "no fast stretch has a catch that can be used"
             if last.fast
-            else "there are only slow stretches, in which nothing catches"
+            else "there are only slow stretches, which have no catch"
         )
         names = [name for name in QUANTITIES if name not in ALWAYS]
         names += [name for name in options.fitted if name in ("lag", "catch_rise")]
@@ -607,9 +607,9 @@ def _remarks(
 ) -> tuple[str, ...]:
     # first which torque it is, of recordings of masrel's driver
     texts: dict[TorqueSource, str] = {
-        "sensor": "measured by the device's sensor: what friction compensation leaves "
-        "of the device is in it",
-        "model": "what the joint model asked for, not measured",
+        "sensor": "measured by the device's sensor; it includes any friction that was "
+        "not compensated",
+        "model": "commanded by the joint model, not measured",
     }
     n_from = Counter(movement.torque_source for movement in movements)
     catches = [trial.catch for trial in last.trials if trial.catch is not None]
@@ -617,7 +617,7 @@ def _remarks(
     behind = _n_censored(last)
     unused = sum(trial.catch is None for trial in last.fast)
     remarks = [
-        f"Torque of {n_from[source]} of {len(movements)} recordings: {text}"
+        f"The torque of {n_from[source]} of {len(movements)} recordings was {text}"
         for source, text in texts.items()
         if n_from[source]
     ]
@@ -628,16 +628,16 @@ def _remarks(
         (
             behind > 0,
             f"{behind} of {len(catches)} catches do not end within their stretch: D "
-            "counts each as longer than what could be seen of it (censored), and "
-            "takes travels to be normal",
+            "counts each as longer than was recorded (censored), and assumes that "
+            "travels are normally distributed",
         ),
         (
             behind < unended < len(catches),
             f"{unended - behind} of {len(catches)} catches do not end within their "
-            "stretch and say nothing of D: if D differs between trials, those with a "
-            "short one are left, and D is underestimated",
+            "stretch and are left out of D: if travels differ between trials, the "
+            "short ones remain, and D is underestimated",
         ),
-        (unused > 0, f"{unused} of {len(last.fast)} fast stretches are not used"),
+        (unused > 0, f"{unused} of {len(last.fast)} fast stretches were not used"),
     )
     return (*remarks, *(text for is_so, text in cautions if is_so))
 
@@ -649,20 +649,20 @@ class ComparedFit:
     Attributes
     ----------
     fitted : tuple of str
-        What is fitted of the arm.
+        Terms of the arm that are fitted.
     fit : ElbowFit or None
-        The fit; None if there is none.
+        The fit; None if it was refused.
     reason : str or None
-        Why there is none.
+        Why it was refused.
     error : float
-        Root mean square distance of a trial's torque from what the parameters of all
-        other trials give, N·m.
+        Root mean square error of a trial's torque predicted from the parameters of
+        all other trials, N·m.
     worse : float
-        Mean over trials of the squared distance less that of the best fit, (N·m)².
+        Mean over trials of the squared error minus that of the best fit, (N·m)².
     worse_se : float
-        Standard error of that, over trials; 0 for the best.
+        Standard error of `worse`, over trials; 0 for the best.
     is_chosen : bool
-        Whether no fit with less of an arm is within one standard error of the best.
+        Whether this is the first fit within one standard error of the best.
     """
 
     fitted: tuple[str, ...]
@@ -692,7 +692,7 @@ def against_best(squares: Floats) -> tuple[Floats, Floats, Floats]:
 def compare_fits(
     recordings: Sequence[Movement | Path | str], **options: Any
 ) -> tuple[ComparedFit, ...]:
-    """Fit with each thing that an arm may have, and predict each trial from the others.
+    """Fit with each further term of an arm, and predict each trial from the others.
 
     Parameters
     ----------
@@ -704,10 +704,10 @@ def compare_fits(
     Returns
     -------
     tuple of ComparedFit
-        The fit with these options first, then with one thing more of the arm each.
-        A trial left out keeps its own constant, peak, residual and travel; what the
-        others say of it is reckoned as linear as the equations are at the fit. The
-        number of trials that all fits use is what is compared.
+        The fit with these options first, then one with each further term of the arm.
+        A trial that is left out keeps its own constant, peak, residual and travel;
+        its prediction uses the equations linearised at the fit. Only trials that all
+        fits use are compared.
 
     Raises
     ------

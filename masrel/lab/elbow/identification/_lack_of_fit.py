@@ -1,10 +1,10 @@
-"""Whether the law is that of the recordings: what is left, and what it goes with.
+"""Whether the law fits the recordings: the residual torque, and patterns in it.
 
 Each test adds one structure to the law that a real arm or sensor may have, and asks
 whether its size differs from 0 by more than trials differ (CR2 with Satterthwaite's
 degrees of freedom, clustered by trial: noise may have any colour within a trial); one
-more asks whether trials drift each in a way of its own. All tests together are held to
-one level by Holm's method.
+more asks whether each trial has a drift of its own. Holm's method keeps all tests
+together at one level.
 """
 
 import math
@@ -48,15 +48,15 @@ STRUCTURES = {
     "bent stiffness": ("a stiffness that changes with the angle", ""),
     "bent damping": ("a damping that changes with the speed", ""),
     "arm_inertia": ("the inertia of the arm", "--arm-inertia fitted"),
-    "drift": ("a drift of the torque", "--drift fitted"),
-    "lag": ("a lag of the sensor", "--lag fitted"),
-    "late angle": ("an angle that is late beside the torque", "--lag fitted"),
+    "drift": ("a drift in the torque", "--drift fitted"),
+    "lag": ("a lag in the sensor", "--lag fitted"),
+    "late angle": ("an angle that is recorded later than the torque", "--lag fitted"),
     "catch_rise": ("a catch that takes time to rise", "--rise fitted"),
     "residual slope": ("a torque that changes within the catch", ""),
-    "bent climb": ("a stiffness after the catch that changes", ""),
-    "catch angle": ("catch angles that bend with the speed", ""),
-    "peak": ("peaks that are not in proportion to the speed", ""),
-    "residual": ("residual torques that are not in proportion to the peaks", ""),
+    "bent climb": ("a stiffness after the catch that is not constant", ""),
+    "catch angle": ("catch angles that are not linear in the speed", ""),
+    "peak": ("peaks that are not proportional to the speed", ""),
+    "residual": ("residual torques that are not proportional to the peaks", ""),
     "travel": ("travels that change with the speed", ""),
     "own drifts": ("drifts that differ from trial to trial", "--drift fitted"),
 }
@@ -73,14 +73,15 @@ class StructureTest:
     Attributes
     ----------
     name : str
-        Which.
+        The structure.
     t, df : float
-        Its size over its standard error, and degrees of freedom; of drifts that differ,
-        which have no one size, the root of F and the degrees of its denominator.
+        Its size over its standard error, and the degrees of freedom; for drifts that
+        differ, which have no single size, the root of F and the degrees of freedom of
+        its denominator.
     p_value : float
-        Two-sided, of this test alone.
+        Two-sided p-value of this test alone.
     adjusted : float
-        The same, held to all tests by Holm's method.
+        The p-value adjusted for all tests by Holm's method.
     """
 
     name: str
@@ -92,20 +93,21 @@ class StructureTest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhaseResidual:
-    """What is left of the torque in one phase of all trials.
+    """The residual torque in one phase of all trials.
 
     Attributes
     ----------
     phase : {"slow", "pre-catch", "peak", "catch", "post-catch"}
-        Of slow trials, or of fast ones.
+        The slow trials, or a phase of the fast ones.
     n_samples : int
-        Samples.
+        Number of samples.
     sd : float
-        Root mean square of measured less fitted torque, N·m.
+        Root mean square of measured minus fitted torque, N·m.
     runs : float
-        Runs of one sign over those that independent samples would have.
+        Number of runs of one sign, divided by the number expected for independent
+        samples.
     autocorrelation : float
-        Of neighbouring samples; 0 if they are independent.
+        Autocorrelation of neighbouring samples; 0 if they are independent.
     """
 
     phase: str
@@ -117,23 +119,23 @@ class PhaseResidual:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LackOfFit:
-    """Whether the law is that of the recordings.
+    """Whether the law fits the recordings.
 
     Attributes
     ----------
     verdict : {"fits", "does not fit", "no evidence either way", "undecided"}
-        Not if a test says so, or from the catch on 1.5 times what is left before it.
-        No evidence if no test says so, but in some phase what is left is neither near
-        the noise at rest nor white. Undecided with so few trials that no test says
-        anything.
+        "does not fit" if a test rejects the law, or if the residual after the onset of
+        the catch is more than 1.5 times that before it. "no evidence either way" if
+        no test rejects it, but the residual in some phase is neither near the noise at
+        rest nor white. "undecided" if there are too few trials for any test.
     level : float
-        Of all tests together: how often the right law is called wrong.
+        Level of all tests together: how often a right law is rejected.
     tests : tuple of StructureTest
-        The most telling first.
+        The smallest p-value first.
     explained : float
         Share of the torque's variation within trials that the law explains.
     phases : tuple of PhaseResidual
-        What is left in each phase.
+        The residual in each phase.
     after_to_before : float
         Root mean square residual after the catch over that before it; ``nan`` without
         a catch.
@@ -154,18 +156,19 @@ class LackOfFit:
         """Return the verdict as one sentence."""
         share = f"the law explains {100.0 * self.explained:.1f} % of the torque"
         if self.verdict == "undecided":
-            return f"Fit undecided: too few trials to tell; {share}."
+            return f"Undecided: there are too few trials to test the fit; {share}."
         if not self.tests or (
             self.verdict == "does not fit" and self.tests[0].adjusted >= self.level
         ):
             return (
-                f"DOES NOT FIT: from the catch on {self.after_to_before:.2g} times "
-                f"what is left before it; {share}."
+                f"DOES NOT FIT: the residual after the onset of the catch is "
+                f"{self.after_to_before:.2g} times that before it; {share}."
             )
         first = self.tests[0]
         p = f"p {p_text(first.adjusted)}"
         nothing = (
-            f"nothing left goes with any of {len(self.tests)} structures ({p} at least)"
+            "no pattern was found in the residual "
+            f"({len(self.tests)} kinds checked, smallest {p})"
         )
         if self.verdict == "fits":
             return f"Fits: {nothing}; {share}."
@@ -174,7 +177,7 @@ class LackOfFit:
             is_known = not math.isnan(self.rest_sd)
             at_rest = f"{self.rest_sd:.2g} N·m" if is_known else "unknown"
             return (
-                f"No evidence either way: {nothing}, but what is left is not noise "
+                f"No evidence either way: {nothing}, but the residual is not noise "
                 f"({most.phase}: {most.sd:.2g} N·m, autocorrelation "
                 f"{most.autocorrelation:.2f}; at rest {at_rest}); "
                 f"{share}."
@@ -182,13 +185,13 @@ class LackOfFit:
         words, option = STRUCTURES[first.name]
         remedy = f"; try {option}" if option else ""
         return (
-            f"DOES NOT FIT: what is left goes with {words} ({p}), so that intervals "
-            f"need not hold the truth; {share}{remedy}."
+            f"DOES NOT FIT: the residual shows signs of {words} ({p}), so the "
+            f"intervals may not contain the true values; {share}{remedy}."
         )
 
 
 def lack_of_fit(joint: JointFit, rest_sd: float) -> LackOfFit:
-    """Return what a fit leaves over, and whether that goes with anything."""
+    """Return the residual torque of a fit, and the tests for patterns in it."""
     equations, left = joint.equations, joint.residuals
     added = list(map(_added, equations, joint.values, joint.laws))
     # of catches that outlast their stretch, those that end are the short ones
@@ -332,13 +335,13 @@ def _added(e: Equations, values: Mapping[str, float], law: Floats) -> dict[str, 
 
 
 def own_drifts(slow: Sequence[Part], gravity_angle: float) -> StructureTest | None:
-    """Test whether slow trials drift each in a way of its own; None if too few tell.
+    """Test whether each slow trial has a drift of its own; None if there are too few.
 
     Those are drifts beyond what trials have in common: one drift, b, k, weight,
-    inertia, a stiffness and a damping that bend. Drifts whose signs differ cancel in a
-    mean over trials. So each slow trial is given one, and what they explain is held
-    against what is left (F), in means over 0.25 s, which are as good as independent
-    where a sensor's noise is correlated over less.
+    inertia, and a stiffness and a damping that are not constant. Drifts whose signs
+    differ cancel in a mean over trials. So each slow trial is given its own, and F
+    compares what these explain with the residual, in means over 0.25 s, which are
+    nearly independent if a sensor's noise is correlated over less.
     """
     trials = []
     for part in slow:

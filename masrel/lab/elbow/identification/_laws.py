@@ -107,7 +107,7 @@ _REFLEX = (
     "passive_stiffness",
     "passive_damping",
 )
-_SPEEDS = "stretches beyond the threshold at speeds that differ"
+_SPEEDS = "stretches beyond the threshold at different speeds"
 
 LAWS: dict[str, FittableLaw] = {
     "spring-damper": FittableLaw(
@@ -117,7 +117,7 @@ LAWS: dict[str, FittableLaw] = {
         needs="an angle and a speed that vary",
     ),
     LeadPipe.kind: FittableLaw(
-        law=LeadPipe, free=_BRISTLE, needs="rests before stretches, or ways back"
+        law=LeadPipe, free=_BRISTLE, needs="rests before stretches, or return movements"
     ),
     Cogwheel.kind: FittableLaw(
         law=Cogwheel,
@@ -177,8 +177,8 @@ LAWS: dict[str, FittableLaw] = {
 """The laws of tone that recordings of torque can identify, by name."""
 
 UNFITTED = {
-    Dystonia.kind: "its episodes follow a touch or a movement elsewhere, of which "
-    "recordings of torque and angle hold nothing"
+    Dystonia.kind: "its episodes follow a touch or a movement elsewhere, which "
+    "recordings of torque and angle do not contain"
 }
 """Those that they cannot, with the reason."""
 
@@ -194,12 +194,12 @@ class LawFit:
     estimates : tuple of FittedParameter
         Its parameters, clustered by recording; of the elbow's law by trial.
     rms : float
-        Root mean square torque that it leaves of the recordings it is fitted to, N·m.
+        Root mean square of the residual torque in the recordings it is fitted to, N·m.
     squares : ndarray, shape (n_recordings,)
-        Per recording, the mean square distance of its torque from what the others'
-        parameters give, (N·m)²; ``nan`` where there is no such thing.
+        Per recording, the mean square error of its torque predicted from the others'
+        parameters, (N·m)²; ``nan`` if undefined.
     reason : str or None
-        Why there are none.
+        Why the law is not scored.
     """
 
     name: str
@@ -257,7 +257,7 @@ class LawComparison:
         """Which law predicts best, and whether that is more than chance."""
         order = [i for i in np.argsort(self.worse) if not math.isnan(self.worse[i])]
         if not order:
-            return "No law can be scored: see the reasons."
+            return "No law can be scored, for the reasons below."
         best = self.fits[order[0]]
         text = f"{best.name} predicts left-out recordings best ({best.error:.3g} N·m)"
         if len(order) == 1:
@@ -265,13 +265,14 @@ class LawComparison:
         second, worse = self.fits[order[1]], self.worse[order[1]]
         if worse > self.worse_se[order[1]]:
             return (
-                f"{text}; the next, {second.name} ({second.error:.3g} N·m), is worse "
-                "by more than the standard error of the difference."
+                f"{text}; the second best, {second.name} ({second.error:.3g} N·m), is "
+                "worse by more than the standard error of the difference."
             )
         return (
             f"{text}, but {second.name} ({second.error:.3g} N·m) is not worse by more "
-            "than the standard error of the difference: these recordings do not "
-            f"decide. Of the laws so near, {self.chosen} has the fewest parameters."
+            "than the standard error of the difference, so these recordings do not "
+            "decide between them. Among the laws within one standard error of the "
+            f"best, {self.chosen} has the fewest parameters."
         )
 
 
@@ -329,7 +330,7 @@ def compare_laws(
     late = 0.0 if lag == "off" else lag
     if late == "fitted" or late > 0.0 or drift != "off":
         raise ParameterError(
-            "laws: a lag above 0 and a drift are known of the elbow's law alone; needs "
+            "laws: only the elbow's law can have a lag above 0 or a drift; needs "
             f"--lag off or below 0 and --drift off, got {lag} and {drift}"
         )
     movements = aligned(

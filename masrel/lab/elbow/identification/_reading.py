@@ -164,7 +164,7 @@ def _check_sizes(name: str, angle: _Floats, torque: _Floats) -> None:
         (
             angle.max() - angle.min() < MIN_TRAVEL,
             f"{message}; a stretch travels {needed:g} degrees or more. Is the unit of "
-            "the angle right, and is its column not the torque's?",
+            "the angle right, and is this not the torque column?",
         ),
         error=RecordingError,
     )
@@ -268,7 +268,7 @@ def _factor(name: str, quantity: str, source: str, requested: str | None) -> flo
         (
             not unit,
             f"{source}: column {name} has no unit: name it "
-            f"{' or '.join(f'{quantity}_{u}' for u in units)}, or say the "
+            f"{' or '.join(f'{quantity}_{u}' for u in units)}, or give the "
             f"unit of {quantity}",
         ),
         error=RecordingError,
@@ -353,7 +353,7 @@ def _read_text(path: Path, content: bytes) -> _Table:
     names = [name.strip() for name in names]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise RecordingError(f"{path}: column {twice!r} is there twice")
+        raise RecordingError(f"{path}: column {twice!r} occurs twice")
     # rows that are not blank, by the line where they stand
     filled = {line: row for line, row in enumerate(rows, remarks + 2) if row}
     for line, row in filled.items():
@@ -478,8 +478,8 @@ def read_movement(
     if of_device and source != "recorded":
         if source == "model":
             raise RecordingError(
-                f"{path}: needs the column {MEASURED_TORQUE.column}: what a device "
-                "does beside the torque that is sent only its sensor can tell"
+                f"{path}: needs the column {MEASURED_TORQUE.column}: only a sensor "
+                "can show what a device adds to the commanded torque"
             )
         values["torque"] = values["torque"] - table.column(_COMMANDED)
     sizes = {chosen[key][0]: column.size for key, column in values.items()}

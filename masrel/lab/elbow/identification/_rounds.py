@@ -71,8 +71,8 @@ class FitOptions:
             ),
             (
                 held.residual_reading != "residual" or held.catch_rise != 0.0,
-                "constants: a fit reads Q as section II does and takes the rise of a "
-                'catch from its option; needs residual_reading "residual" and '
+                "constants: a fit reads Q as in section II and takes the rise of a "
+                'catch from its own option; needs residual_reading "residual" and '
                 f"catch_rise 0, got {held.residual_reading!r} and {held.catch_rise:g}",
             ),
             (
@@ -85,9 +85,9 @@ class FitOptions:
             ),
             (
                 fits_inertia and held.post_catch == "additive",
-                'inertia: with post_catch "additive", m is in every phase but the '
-                "catch, and where one ends cannot be told from the jump of m·θ̈; needs "
-                '"zero", got "fitted"',
+                'inertia: with post_catch "additive", m acts in every phase except the '
+                "catch, so the end of a catch cannot be distinguished from the jump of "
+                'm·θ̈; needs "zero", got "fitted"',
             ),
             *(
                 rule
@@ -220,11 +220,11 @@ def fitted_law(joint: JointFit) -> Law:
 
 
 def untimed_terms(joint: JointFit) -> dict[str, str]:
-    """Return why a lag or a rise is not fitted: samples tell it from none."""
+    """Return why a lag or a rise is not fitted: samples cannot show it."""
     floors = {name: n * _period(joint.trials) for name, n in _FLOORS.items()}
     return {
-        name: f"shorter than {1000.0 * floors[name]:.2g} ms, which these samples do "
-        "not tell from nothing: taken as 0"
+        name: f"shorter than {1000.0 * floors[name]:.2g} ms, which these samples "
+        "cannot distinguish from 0; taken as 0"
         for name, value in joint.shared.items()
         if name in floors and abs(value) <= floors[name]
     }

@@ -66,7 +66,7 @@ def fit_catches(
         "post_catch_stiffness",
         climbs,
         level,
-        "no stretch goes on after its catch",
+        "no stretch continues after its catch",
     )
     limits = _limits(trials, levels, law, post.estimates[0].value)
     peaks = [(read.catch.speed, read.peak) for read in reads]
@@ -338,5 +338,5 @@ def _root(function: Callable[[float], float], start: float, step: float) -> floa
             return float(brentq(function, last, last + step, xtol=1e-14, rtol=1e-14))
         last, step = last + step, 2.0 * step
     raise ConvergenceError(
-        "catch_travel: the likelihood of the travels of the catches has no end in sight"
+        "catch_travel: no end of the interval was found; the likelihood does not fall"
     )

@@ -127,7 +127,7 @@ def test_a_joint_whose_catch_never_ends_leaves_d_and_k_post_open() -> None:
     assert "no catch ends within its stretch; D is more than" in str(
         made["catch_travel"].reason
     )
-    assert "no stretch goes on after" in str(made["post_catch_stiffness"].reason)
+    assert "no stretch continues after" in str(made["post_catch_stiffness"].reason)
     assert made["catch_torque_constant"].covers(1.4)
 
 
@@ -145,7 +145,8 @@ def test_catches_that_outlast_their_stretch_count_as_longer() -> None:
     assert (made.n_trials, made.df, made.reason) == (16, 2.0, None)
     assert found.remarks == (
         "13 of 16 catches do not end within their stretch: D counts each as longer "
-        "than what could be seen of it (censored), and takes travels to be normal",
+        "than was recorded (censored), and assumes that travels are normally "
+        "distributed",
     )
     (step,) = [s for s in found.steps if s.name.startswith("catch travel")]
     assert made == step["catch_travel"]
@@ -186,10 +187,10 @@ def wrong_velocity(movements: list[Movement]) -> list[Movement]:
     [
         (lambda m: m[8:], "below 20 deg/s; the slowest of 16 reac"),
         (wrong_velocity, "times the derivative of the angle"),
-        (lambda m: [m[0], m[0]], "slow 0: the recording is there twice"),
+        (lambda m: [m[0], m[0]], "slow 0: the recording was given twice"),
         (
             lambda m: [replace(x, torque=-x.torque) for x in m[:8]],
-            "this is not the law: b is -1.*are both signs right",
+            "the law does not apply: b is -1.*are both signs right",
         ),
     ],
 )
@@ -288,7 +289,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
 
 # A hand that wobbles above the threshold now and then makes a slow stretch one whose
 # catch is not seen; in one study a single catch ends: no interval of D and k_post.
-@pytest.mark.filterwarnings("ignore:slow .* no catch that stands out")
+@pytest.mark.filterwarnings("ignore:slow .* no catch stands out")
 @pytest.mark.filterwarnings("ignore:D, k_post. too few trials")
 @pytest.mark.parametrize(
     ("case", "n", "fewest", "most_missed"),

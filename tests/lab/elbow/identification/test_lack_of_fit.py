@@ -92,7 +92,7 @@ def test_what_an_arm_has_and_the_law_has_not_is_announced(wrong: str) -> None:
     lack = made.lack_of_fit
     assert lack.verdict == "does not fit"
     assert lack.tests[0].adjusted < lack.level
-    assert "DOES NOT FIT: what is left goes with" in lack.sentence
+    assert "DOES NOT FIT: the residual shows signs of" in lack.sentence
     # and its own test is among those that say so
     name = {"rise": "catch_rise"}.get(wrong, wrong)
     (own,) = [test for test in lack.tests if test.name == name]
@@ -117,7 +117,7 @@ def test_what_is_left_after_the_catch_alone_is_announced_with_few_trials() -> No
     lack = quiet_fit(study(HM3, seed=3, n_slow=2, n_fast=2, arm=Arm(rise=0.08)))
     assert lack.lack_of_fit.verdict == "does not fit"
     assert lack.lack_of_fit.tests == ()
-    assert "times what is left before it" in lack.lack_of_fit.sentence
+    assert "times that before it" in lack.lack_of_fit.sentence
 
 
 def test_drifts_that_differ_are_announced_and_fitted() -> None:
@@ -126,7 +126,7 @@ def test_drifts_that_differ_are_announced_and_fitted() -> None:
     lack = fit(movements).lack_of_fit
     assert lack.verdict == "does not fit"
     assert lack.sentence.endswith("; try --drift fitted.")
-    assert "goes with drifts that differ from trial to trial" in lack.sentence
+    assert "signs of drifts that differ from trial to trial" in lack.sentence
     fitted = fit(movements, drift="fitted")
     assert fitted.lack_of_fit.verdict == "fits"
     # one drift for all trials is not one that differs
@@ -138,7 +138,7 @@ def test_drifts_that_differ_are_announced_and_fitted() -> None:
 
 def test_stretches_that_do_not_tell_k_for_their_drifts_say_so() -> None:
     movements = study(HM3, seed=1, n_slow=6, n_fast=0, arm=Arm(own_drift=0.6))
-    with pytest.raises(RecordingError, match="each drifts in its own way"):
+    with pytest.raises(RecordingError, match="each has its own drift"):
         fit(movements)
     assert fit(movements, drift="fitted")["stiffness"].covers(HM3.stiffness)
 
@@ -180,7 +180,7 @@ def sampled(motion: object, name: str, rng: np.random.Generator) -> Movement:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_constant_speeds_do_not_tell_b_from_the_sensors_zero(seed: int) -> None:
-    with pytest.raises(RecordingError, match=r"do not tell b \(.*standard error"):
+    with pytest.raises(RecordingError, match=r"cannot distinguish b \(.*standard"):
         fit(motor("constant", seed))
 
 
@@ -206,7 +206,7 @@ def test_a_residual_above_its_peak_is_not_the_law() -> None:
         )
     with pytest.raises(
         RecordingError,
-        match=r"this is not the law: Q is .*, 1 or more beyond its error",
+        match=r"the law does not apply: Q is .*, above 1 by more than its error",
     ):
         fit(movements)
 
@@ -215,7 +215,7 @@ def test_a_residual_above_its_peak_is_not_the_law() -> None:
 def test_an_inertia_below_0_is_not_the_law(term: str) -> None:
     # as of a torque whose sign is wrong: by the tests alone, it would fit
     movements = study(HM3, seed=5000, arm=Arm(inertia=-0.05))
-    with pytest.raises(RecordingError, match=r"this is not the law: [Jm] of all trial"):
+    with pytest.raises(RecordingError, match=r"the law does not apply: [Jm] from all"):
         fit(movements, **{term: "fitted"})
 
 

@@ -165,7 +165,7 @@ def test_weight_and_inertia_of_the_arm_count_for_every_law() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"lag": "fitted"}, "a lag above 0 and a drift are known of the elbow's"),
+        ({"lag": "fitted"}, "only the elbow's law can have a lag above 0"),
         ({"drift": 0.1}, "got off and 0.1"),
         ({"laws": ["lead-pipe"]}, "lead-pipe-rigidity"),
     ],

@@ -138,7 +138,7 @@ HEAD = "time_s,angle_deg,torque_nm\n"
         ("time_s,angle_deg\n0,1\n", "needs a column of torque: torque_nm, torque_mnm"),
         ("time_s,angle,torque_nm\n", "column angle has no unit: name it angle_d"),
         ("time_s,time_ms,torque_nm\n", "needs one column of time, got time_s"),
-        ("time_s,time_s,torque_nm\n", "column 'time_s' is there twice"),
+        ("time_s,time_s,torque_nm\n", "column 'time_s' occurs twice"),
         (f"{HEAD}0,1,2\n0.1,1\n", "line 3: needs 3 cells, got 2"),
         (
             f"# x: y\n{HEAD}0,1,2\n0.1,eins,2\n",

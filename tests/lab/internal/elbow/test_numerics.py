@@ -146,7 +146,7 @@ def test_as_many_trials_as_parameters_leave_no_freedom() -> None:
     estimates = fitted(("a", "b"), found, 0.95)
     assert all(np.isnan(estimate.low) for estimate in estimates)
     assert {estimate.reason for estimate in estimates} == {
-        "these trials fit exactly: an interval needs more that differ"
+        "these trials fit exactly; an interval needs trials that differ"
     }
 
 
