@@ -198,12 +198,12 @@ class Questions(Estimating):
             ),
             (
                 clusters is not None and of_raters,
-                "--clusters: clusters are of items, so it needs --target items, got "
+                "--clusters: clusters group items, so it needs --target items, got "
                 f"--target {self.target}",
             ),
             (
                 self.convention is not None and of_raters,
-                "--convention: the errors that programs print are for other items, so "
+                "--convention: other programs print errors for other items, so "
                 f"it needs --target items, got --target {self.target}",
             ),
             (

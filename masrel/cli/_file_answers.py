@@ -117,7 +117,11 @@ _ESTIMATING = {
         help="Level of the intervals.",
     ),
     "resamples": click.option(
-        "--resamples", "n_resamples", default=10_000, show_default=True
+        "--resamples",
+        "n_resamples",
+        default=10_000,
+        show_default=True,
+        help="Number of resamples of --interval bootstrap.",
     ),
     "seed": click.option(
         "--seed", default=0, show_default=True, help="Random seed for resampling."

@@ -92,7 +92,7 @@ def audit(
 
     Give the printed numbers as options, or as SOURCE: a CSV file with one row per
     claim, or a study that has such a file, ratings/claims.csv. Every way to read the
-    numbers is tried. If no table fits, the numbers as read cannot belong together; the
+    numbers is tried. If no table fits, the numbers as read contradict each other; the
     reason is unknown.
     """
     # printed: what the options say, by the parameters of a claim

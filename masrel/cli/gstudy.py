@@ -120,7 +120,7 @@ def gstudy(
     output: OutputOptions,
     **of_intervals: Any,
 ) -> None:
-    """Estimate where the variance of the ratings in FILE lies and what is reliable.
+    """Estimate the sources of variance of the ratings in FILE, and reliability.
 
     FILE has one row per rating, with columns for what is measured (--item), for facets
     and for grades. The command gives components of variance with intervals, and the

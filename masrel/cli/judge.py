@@ -91,7 +91,7 @@ judge = file_command(
             "--min-items",
             default=30,
             show_default=True,
-            help="Fewest items for which a human is tested.",
+            help="Test a human only with at least this many items.",
         ),
         click.option(
             "--rate",

@@ -256,7 +256,7 @@ def _with_own_target(result: Estimate, target: Target, rule: str) -> Estimate:
         return result
     note = _Caution(
         f"the only interval available is for other {_POPULATIONS[interval.target]}, "
-        f"so it is rather too wide for other {_POPULATIONS[target]}"
+        f"so it is wider than needed for other {_POPULATIONS[target]}"
     )
     return replace(result, interval=replace(interval, notes=(*interval.notes, note)))
 

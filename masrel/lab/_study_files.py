@@ -50,7 +50,7 @@ MAX_RECORDING = 128_000_000
 
 # What names every file of a report with its hash; what stands there while it is made
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
-CUT_OFF = "was cut off while it was made; masrel report makes it again"
+CUT_OFF = "is incomplete because writing was interrupted; masrel report writes it again"
 
 
 def is_cut_off(report: Path) -> bool:

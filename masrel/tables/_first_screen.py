@@ -240,7 +240,7 @@ _VERDICTS = {
     "{advantage} % of {items} its grade is at least as close to those of the other "
     "humans as a human's is{ends}.",
     "judge_reference": "{judge}{group} {may}: it gives the grade of {reference} on "
-    "{difference} % of {items} {more} than {human}{ends}, and {margin} % fewer would "
+    "{difference} % {more} of the {items} than {human}{ends}; {margin} % fewer would "
     "be acceptable.{no_proof}",
     "truth": "By the ratings alone, {class}{group} is the class of {share} % of "
     "{items}{ends}, if raters err independently.",
@@ -284,7 +284,7 @@ def _verdicts(answered: Sequence[Answer], items: str) -> Iterator[str]:
                 else "has not been shown to be able to replace a human",
                 "n_needed": f"{n} {'is' if n == 1 else 'are'} "
                 f"{'enough' if passes else 'needed'}",
-                "no_proof": "" if passes else " That is no proof that it is worse.",
+                "no_proof": "" if passes else " This does not prove that it is worse.",
                 "more": "fewer" if (row.get("difference") or 0.0) < 0.0 else "more",
                 "items": items,
                 "ends": ends,

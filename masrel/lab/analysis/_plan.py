@@ -51,7 +51,7 @@ from masrel.lab.ratings import (
     retest_pairs,
 )
 
-_SEALED_STILL = "which models were met is sealed"
+_SEALED_STILL = "the models presented are sealed"
 
 
 def analyze(

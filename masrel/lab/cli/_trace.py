@@ -76,20 +76,19 @@ class _MotionOptions:
         refuse(
             (
                 (self.kind == "recording") != of_recording,
-                "--recording: goes with --motion recording, and that needs a file",
+                "--recording: is for --motion recording, which needs a file",
             ),
             (
                 (self.kind == "trapezoid") != (self.acceleration is not None),
-                "--acceleration-deg-s2: goes with --motion trapezoid, and that needs "
-                "it",
+                "--acceleration-deg-s2: is for --motion trapezoid, which needs it",
             ),
             (
                 not of_recording and self.interpolation is not None,
-                "--interpolation: goes with --motion recording",
+                "--interpolation: is for --motion recording",
             ),
             (
                 of_recording and (self.start, self.end) != (None, None),
-                "--from-deg, --to-deg: a recording starts and ends where it does",
+                "--from-deg, --to-deg: a recording has its own start and end",
             ),
             (
                 (self.stop is None) != (self.pause is None),
@@ -111,10 +110,14 @@ _motion_options = grouped(
     _MotionOptions,
     click.option(
         "--motion", "kind", type=click.Choice(_KINDS), default="constant",
-        show_default=True,
+        show_default=True, help="Kind of motion.",
     ),
-    click.option("--from-deg", "start", type=float, help="Start.  [default: 30]"),
-    click.option("--to-deg", "end", type=float, help="End.  [default: 146]"),
+    click.option(
+        "--from-deg", "start", type=float, help="Angle at the start.  [default: 30]"
+    ),
+    click.option(
+        "--to-deg", "end", type=float, help="Angle at the end.  [default: 146]"
+    ),
     click.option(
         "--acceleration-deg-s2", "acceleration", type=float,
         help="Acceleration of a trapezoid's ramps.",
@@ -211,7 +214,7 @@ def trace(
     refuse(
         (
             rate_hz is not None and csv_file is None,
-            "--rate-hz: needs --csv, whose samples it spaces",
+            "--rate-hz: needs --csv, because it is the rate of its samples",
         ),
         (
             rate_hz is not None and not math.isfinite(rate_hz),
@@ -220,7 +223,7 @@ def trace(
         (csv_file == Path("-"), "--csv: needs the name of a file, got -"),
         (
             view is not None and output.figure is None,
-            "--view: needs --figure, whose contents it chooses",
+            "--view: needs --figure, because it chooses what that shows",
         ),
     )
     if speed_range is not None:

@@ -36,7 +36,7 @@ _DAY = datetime(2012, 1, 1, tzinfo=UTC)
 def demo(out: Path, template: str | None, device: str, output: OutputOptions) -> None:
     """Run a complete simulated study in OUT; report it and the published study.
 
-    A small study of tone other than spasticity follows.
+    A small study of other kinds of tone is run as well.
 
     OUT must be a new or empty folder. The same seed gives the same schedules, ratings,
     analysis and reports, byte for byte.

@@ -426,7 +426,9 @@ def _of_study(session: _Session, protocol: Protocol) -> _Session:
 
 
 @device.command("calibrate")
-@click.option("--who", required=True, help="Name or initials of who calibrates.")
+@click.option(
+    "--who", required=True, help="Name or initials of the person who calibrates."
+)
 @_study_option
 @_free_arm_option
 @click.option(
@@ -437,7 +439,7 @@ def _of_study(session: _Session, protocol: Protocol) -> _Session:
 @click.option(
     "--radius-m",
     type=click.FloatRange(0.0, 1.0, min_open=True),
-    help="Distance from the axis at which they pull.",
+    help="Distance from the axis to the point where the masses pull.",
 )
 @_device_command
 def _calibrate(
@@ -447,13 +449,13 @@ def _calibrate(
     mass_kg: list[float],
     radius_m: float | None,
 ) -> None:
-    """Measure noise, delay, inertia, friction and the gain of torque of a device.
+    """Measure a device's noise, delay, inertia, friction and torque gain.
 
     The free arm first rests for 2 s. Then the motor moves it between 40 and 115 deg for
-    about a minute, with at most 2 N·m. Weights, which it carries between 70 and 85 deg,
-    give the gain; where there is a torque sensor, what it reads counts instead of their
-    masses. With --study the result is written into STUDY/calibrations, and sessions use
-    it.
+    about a minute, with at most 2 N·m. Weights that it carries between 70 and 85 deg
+    give the gain. If the device has a torque sensor, its readings are used instead of
+    the masses. With --study the result is written to STUDY/calibrations, and sessions
+    use it.
     """
     if mass_kg and radius_m is None:
         raise click.UsageError("--mass-kg: needs --radius-m")
@@ -540,15 +542,15 @@ def _boards(session: _Session) -> list[dict[str, Any]]:
     type=click.FloatRange(0.01, 1440.0),
     default=0.05,
     show_default=True,
-    help="How long the loop runs in real time, to see how late its ticks are.",
+    help="Minutes for which the loop runs in real time, to see how late its ticks are.",
 )
 @_device_command
 def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
-    """Compare the torque that a device gives with the one that is asked for.
+    """Compare the torque that a device delivers with the torque of the model.
 
-    A simulated hand makes the 32 stretches of Table V of Park, Kim and Damiano (2012),
-    of the models HM1 to HM4, or a person does, whom the command tells each time. Then
-    the loop runs in real time on an arm that is held still.
+    A simulated hand, or a person who is prompted each time, makes the 32 stretches of
+    HM1 to HM4 in Table V of Park, Kim and Damiano (2012). Then the loop runs in real
+    time on an arm that is held still.
     """
     hess2012, calibration = StudyPaths(_home() / "hess2012"), None
     table_v = read_protocol(hess2012.protocol)

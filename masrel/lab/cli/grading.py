@@ -33,9 +33,16 @@ if TYPE_CHECKING:
     type=click.Choice(["standard", "dummy", "all"]),
     default="all",
     show_default=True,
+    help="Use only ratings of these models.",
 )
 @click.option("--session", help="Use only ratings of this session.")
-@click.option("--level", type=float, default=0.95, show_default=True)
+@click.option(
+    "--level",
+    type=float,
+    default=0.95,
+    show_default=True,
+    help="Level of the intervals.",
+)
 @output_options(
     json='Write JSON to this file; "-" writes it to standard output and prints nothing '
     "else.",

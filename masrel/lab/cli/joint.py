@@ -140,7 +140,10 @@ joint_options = grouped(
 
 @click.command("tardieu", cls=GroupedHelp)
 @joint_options
-@click.option("--from-deg", "start", type=float, default=START_DEG, show_default=True)
+@click.option(
+    "--from-deg", "start", type=float, default=START_DEG, show_default=True,
+    help="Angle at the start.",
+)  # fmt: skip
 @click.option(
     "--speed-deg-s", "speeds", type=(float, float, float), metavar="V1 V2 V3",
     default=(10.0, 100.0, 150.0),
@@ -238,7 +241,7 @@ def _joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
         ((problem := kind_problem(kind)) is not None, f"--kind: {problem}"),
         (
             kind == DEFAULT_KIND,
-            f"--kind: needs another kind than {kind}, whose models --model names",
+            f"--kind: needs a kind other than {kind}; --model names models of that kind",
         ),
     )
     values: dict[str, float] = {}
@@ -359,8 +362,8 @@ def _source(name: str, model: str) -> tuple[str, bool]:
     simulated = parse_toml(content).get("simulated")
     if not isinstance(simulated, bool):
         raise ParameterError(
-            f"{model}: simulated must be true or false: what is made of the model says "
-            f"the same; got {'nothing' if simulated is None else repr(simulated)}"
+            f"{model}: simulated must be true or false, because models made from it "
+            f"inherit it; got {'nothing' if simulated is None else repr(simulated)}"
         )
     checksum = hashlib.sha256(content).hexdigest()
     return f"{name} ({model}, sha256 {checksum[:16]})", simulated
@@ -374,9 +377,8 @@ def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None
     there = [path.name for path in files if path.exists()]
     if there and not overwrite:
         raise ParameterError(
-            f"--output: {folder} holds {', '.join(there[:3])}"
-            f"{' and more' if len(there) > 3 else ''} already; --overwrite replaces "
-            "what is there"
+            f"--output: {folder} already holds {', '.join(there[:3])}"
+            f"{' and more' if len(there) > 3 else ''}; --overwrite replaces them"
         )
     for path, row in zip(files, rows, strict=True):
         document = {key: row[key] for key in row if key not in _PLACES}

@@ -70,7 +70,7 @@ def _copy(paths: StudyPaths, protocol: Protocol, site: str, destination: Path) -
     from masrel.lab.schedule import copy_for_site
 
     copy_for_site(protocol, paths, site, destination)
-    click.echo(f"{destination}: a copy of the study with the secret of {site} alone.")
+    click.echo(f"{destination}: a copy of the study with only the secret of {site}.")
 
 
 @schedule.command(STUDY)

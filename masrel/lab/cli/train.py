@@ -82,7 +82,13 @@ def _show_grade(lesson: "Lesson") -> None:
 @train.command("show")
 @of_study
 @id_option
-@click.option("--level", type=float, default=0.95, show_default=True)
+@click.option(
+    "--level",
+    type=float,
+    default=0.95,
+    show_default=True,
+    help="Level of the intervals.",
+)
 @click.option(
     "--html",
     "page",

@@ -162,7 +162,7 @@ def _shown_in_report(paths: StudyPaths) -> list[str]:
     except (ValueError, TypeError, KeyError, AttributeError):
         raise ParameterError(
             f"{manifest}: needed the manifest of a report, got another file; masrel "
-            "report writes it anew"
+            "report writes it again"
         ) from None
     in_logs = {"who": "logs", "notes": "logs"}
     return sorted({in_logs.get(name, name) for name in shown.split()})

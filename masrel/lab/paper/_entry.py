@@ -200,7 +200,7 @@ def _refuse_unpresented(form: Form, state: SessionState, path: Path) -> None:
         raise SessionLogError(
             f"{path}: needed every model of the session presented before its sheet is "
             f"entered, {len(left)} of {len(form.codes)} are not: masrel run --grades "
-            "paper goes on"
+            "paper resumes it"
         )
 
 

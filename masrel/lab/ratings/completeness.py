@@ -196,8 +196,8 @@ def _of_conduct(study: StudyPaths, include: Collection[str]) -> Iterator[str]:
             yield _of_unblinding(event, by)
         elif event in latest.values():
             yield (
-                f"Rater {fields['rater']} was excluded {by} The grades are kept, and "
-                "enter no number."
+                f"Rater {fields['rater']} was excluded {by} The grades are kept but "
+                "not used in any number."
             )
 
 

@@ -341,7 +341,7 @@ def _rows(
     if state.header.get("rehearsal"):
         raise RatingsError(
             f"{log}: needed the log of a session, got that of a rehearsal, whose "
-            "grades are no ratings of the study: move it away"
+            "grades are not ratings of the study: move it away"
         )
     schedule = _schedule(study, protocol, state, log)
     presented = [event for events in state.presented.values() for event in events]

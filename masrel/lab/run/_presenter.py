@@ -231,6 +231,6 @@ def check_same(
         value, was = same[name], begun.get(name, False)  # there once were no rehearsals
         if was != value and not (name == "grades" and may_go_on(was, value)):
             raise SessionLogError(
-                f"{path}: begun with {name} = {was}: needed the same to go on, got "
+                f"{path}: begun with {name} = {was}: needed the same to resume, got "
                 f"{value}"
             )

@@ -277,7 +277,7 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
         (
             ("resumed", "restarted"),
             source is not None and not may_go_on(begun, source),
-            f"a session that goes on with {begun}, got {source}",
+            f"a session that resumes with {begun}, got {source}",
         ),
         (
             ("answered", "answer-correction"),
@@ -362,7 +362,7 @@ def _answer_key(event: Event) -> AnswerKey:
 
 
 def may_go_on(begun: object, source: object) -> bool:
-    """Return whether a session begun with one source of grades goes on with another."""
+    """Return whether a session begun with one source of grades resumes with another."""
     return begun == source or (begun in AT_THE_DEVICE and source in AT_THE_DEVICE)
 
 

@@ -89,7 +89,7 @@ class ConsoleGrades(GradeSource):
         again = "" if request.attempt == 1 else " again"
         presentation = request.presentation
         labels = ["REHEARSAL"] * request.rehearsal + ["PRACTICE"] * request.practice
-        label = f"{', '.join(labels)}, no rating of the study. " if labels else ""
+        label = f"{', '.join(labels)}, not a rating of the study. " if labels else ""
         self._ask_or_correct(
             request,
             f"{label}Presentation {presentation.position} of "
@@ -261,14 +261,14 @@ class ConsoleGrades(GradeSource):
         Parameters
         ----------
         request : GradeRequest
-            What comes next if it goes on.
+            What comes next if it is resumed.
         days : int
             How many days ago it was left.
 
         Returns
         -------
         bool
-            Whether it begins anew.
+            Whether it starts again.
 
         Raises
         ------
@@ -280,12 +280,12 @@ class ConsoleGrades(GradeSource):
             answer = self._ask(
                 request,
                 f"This session was left {when}, before presentation "
-                f"{request.presentation.position} of {request.n_presentations}. Go on, "
-                "or begin anew? Then the earlier grades no longer count. (go on; anew; "
-                "stop): ",
+                f"{request.presentation.position} of {request.n_presentations}. Resume "
+                "it, or start again? After a new start the earlier grades no longer "
+                "count. (resume; restart; stop): ",
             )
-            if answer in ("go on", "anew"):
-                return answer == "anew"
+            if answer in ("resume", "restart"):
+                return answer == "restart"
 
     def answer(self, request: QuestionRequest) -> Answer:
         """Ask a question until it is answered.

@@ -77,8 +77,7 @@ def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> 
     arguments = ("joint", "between", "HM1", "HM2", "-n", "2", "-o", tmp_path)
     said = refused(masrel(*arguments))
     assert said == (
-        f"--output: {tmp_path} holds D02.toml already; --overwrite replaces what is "
-        "there"
+        f"--output: {tmp_path} already holds D02.toml; --overwrite replaces them"
     )
     assert [path.name for path in tmp_path.iterdir()] == ["D02.toml"]
     assert (tmp_path / "D02.toml").read_text(encoding="utf-8") == "mine"

@@ -124,10 +124,10 @@ def test_a_figure_explains_its_phases_where_one_catches(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--motion", "trapezoid"], "--acceleration-deg-s2: goes with"),
-        (["--acceleration-deg-s2", 3], "--acceleration-deg-s2: goes with"),
-        (["--motion", "recording"], "--recording: goes with --motion recording"),
-        (["--recording", "x.csv"], "--recording: goes with --motion recording"),
+        (["--motion", "trapezoid"], "--acceleration-deg-s2: is for"),
+        (["--acceleration-deg-s2", 3], "--acceleration-deg-s2: is for"),
+        (["--motion", "recording"], "--recording: is for --motion recording"),
+        (["--recording", "x.csv"], "--recording: is for --motion recording"),
         (["--stop-at-s", 1], "--stop-at-s, --pause-s: each needs the other"),
         (
             ["--stop-at-s", 9, "--pause-s", 1],
@@ -137,7 +137,7 @@ def test_a_figure_explains_its_phases_where_one_catches(tmp_path: Path) -> None:
         (["--stop-at-s", 1, "--pause-s", "nan"], "--pause-s: needs more than 0 and"),
         (
             ["--interpolation", "linear"],
-            "--interpolation: goes with --motion recording",
+            "--interpolation: is for --motion recording",
         ),
         (["--view", "time"], "--view: needs --figure"),
         (["--rate-hz", "nan"], "--rate-hz: needs a finite rate, got nan"),

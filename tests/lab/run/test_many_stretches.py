@@ -330,7 +330,9 @@ def test_a_rehearsal_that_was_stopped_is_gone_on_with(
     source, said = console("\n1\n\nstop\n")
     with pytest.raises(RuntimeError, match="presentation 2 of 3"):
         run(small, source, rehearsal=True)
-    assert "REHEARSAL, no rating of the study. Presentation 1 of 3" in said.getvalue()
+    assert (
+        "REHEARSAL, not a rating of the study. Presentation 1 of 3" in said.getvalue()
+    )
     before = small[0].root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
     lines = before.read_bytes()
     if not same_secret:  # it is left, and another begun

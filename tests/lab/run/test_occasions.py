@@ -159,7 +159,7 @@ def test_the_console_says_what_is_practice_and_what_a_break(new_study: New) -> N
     text = shown.getvalue()
     first = "Hold the wrist.\nPress Enter to continue, or type stop: PRACTICE, "
     assert text.startswith(first)
-    assert "PRACTICE, no rating of the study. Presentation 2 of 2, code P2. " in text
+    assert "PRACTICE, not a rating of the study. Presentation 2 of 2, code P2. " in text
     assert text.count("PRACTICE") == 2
     assert text.count("A break of 3 minutes. Then press Enter to continue") == 2
     assert "HM" not in text
@@ -266,7 +266,7 @@ def test_a_session_that_begins_anew_sets_aside_what_was(new_study: New) -> None:
     assert remark.endswith("not among the ratings: 1.")
 
 
-@pytest.mark.parametrize(("word", "restart"), [("go on", False), ("anew", True)])
+@pytest.mark.parametrize(("word", "restart"), [("resume", False), ("restart", True)])
 def test_a_rater_is_asked_whether_to_go_on(
     new_study: New, word: str, restart: bool
 ) -> None:

@@ -395,7 +395,7 @@ def test_no_page_does_what_only_ours_may_and_each_does_without_its_guard(
                 with contextlib.suppress(api.TimeoutError):
                     await page.wait_for_url("**/rater", timeout=2000)
                 if "token" in page.url:
-                    await page.get_by_text("Go on").click()
+                    await page.get_by_text("Continue").click()
                     await page.wait_for_url("**/rater")
                 has_worked = await attack(page, victim, server)
                 await page.context.close()

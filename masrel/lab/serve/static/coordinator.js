@@ -11,7 +11,7 @@ const state = { desk: null, overview: null, jobs: {}, log: [] };
 const banner = at("banner");
 const lost = () => {
   banner.classList.add("lost");
-  banner.textContent = "No connection to the server. This page goes on by itself.";
+  banner.textContent = "No connection to the server. This page will continue automatically.";
 };
 const back = () => {
   if (!banner.classList.contains("lost")) return;
@@ -46,20 +46,20 @@ at("stop").addEventListener("click", async () => {
 
 const screenWords = {
   starting: "is starting",
-  instructions: "reads the instructions",
+  instructions: "is reading the instructions",
   ready: "is asked to begin",
-  presenting: "feels",
-  grade: "grades",
-  fault: "is told that a check stopped",
-  question: "answers a question",
-  break: "has a break",
-  anew: "is asked whether the session begins again",
+  presenting: "is feeling",
+  grade: "is grading",
+  fault: "sees that a check stopped",
+  question: "is answering a question",
+  break: "is having a break",
+  anew: "is asked whether to start the session again",
 };
 
 function nowWords(desk) {
   if (!desk.session) {
-    if (desk.screen !== "over") return "No session runs.";
-    return `No session runs. The last one: ${desk.text}.`;
+    if (desk.screen !== "over") return "No session is running.";
+    return `No session is running. The last one: ${desk.text}.`;
   }
   const { rater, session, rehearsal } = desk.session;
   const what = desk.code ? ` ${desk.practice ? "practice " : ""}${desk.code}` : "";
@@ -75,9 +75,9 @@ function showDesk() {
   if (!desk || !overview) return;
   at("stop").disabled = !desk.session;
   const isRehearsal = Boolean(desk.session?.rehearsal);
-  at("log-title").textContent = isRehearsal ? "Log of this rehearsal: nothing of it counts" : "Log of this session";
+  at("log-title").textContent = isRehearsal ? "Log of this rehearsal: nothing counts" : "Log of this session";
   const parts = [h("p", { className: "now" }, nowWords(desk))];
-  if (isRehearsal) parts.unshift(h("p", { className: "label" }, "Rehearsal: nothing of it counts"));
+  if (isRehearsal) parts.unshift(h("p", { className: "label" }, "Rehearsal: nothing counts"));
   if (desk.screen === "fault") parts.push(h("p", {}, desk.why));
   for (const note of desk.notes) parts.push(h("p", { className: "faint" }, `Note: ${note}.`));
   at("now").replaceChildren(...parts);
@@ -109,7 +109,7 @@ function startForm(overview, said) {
   const begun = open.find((each) => each.stage === "begun") ?? open.find((each) => each.stage === "drawn");
   if (begun) select.value = JSON.stringify([begun.rater, begun.session]);
   const rehearsal = h("input", { type: "checkbox", name: "rehearsal" });
-  const button = h("button", { type: "submit", className: "main", disabled: !open.length }, "Start or go on");
+  const button = h("button", { type: "submit", className: "main", disabled: !open.length }, "Start or resume");
   const form = h(
     "form",
     {},
@@ -203,7 +203,7 @@ const deviceWords = {
 function showDevice({ device, n_torque_problems: n }) {
   at("simulated").hidden = device.backend !== "simulated";
   const rows = Object.entries(device).map(([key, value]) => [deviceWords[key] ?? key, String(value)]);
-  const problem = n ? h("p", { className: "refused" }, `${n} models ask for more than the device may send; masrel check names them.`) : "";
+  const problem = n ? h("p", { className: "refused" }, `${n} models need more torque than the device may send; masrel check names them.`) : "";
   at("device").replaceChildren(table(["Setting", "Value"], rows), problem);
 }
 
@@ -214,7 +214,7 @@ const nextSaid = outcome();
 /** What to press for the next step; null where this page has no act for it. */
 function nextAct({ verb, command, rater, session }, stage) {
   if (command.includes("--grades paper")) return null;
-  if (["run", "serve"].includes(verb)) return [stage === "begun" ? "Go on with it" : "Start it", "start", { rater, session }];
+  if (["run", "serve"].includes(verb)) return [stage === "begun" ? "Resume it" : "Start it", "start", { rater, session }];
   if (verb === "schedule") return ["Draw the missing schedules", "draw", {}];
   return verb in jobWords ? [jobWords[verb], "job", { verb }] : null;
 }
@@ -295,13 +295,13 @@ function showJobs() {
 
 // --- what is recorded -----------------------------------------------------------------
 
-const who = ["who", "Who says so", { required: true }];
+const who = ["who", "Reported by", { required: true }];
 const why = ["why", "Why", { required: true }];
 const rater = ["rater", "Rater", { options: "raters" }];
 const session = ["session", "Session", { options: "sessions" }];
 const needRater = ["rater", "Rater", { options: "raters", required: true }];
 const needSession = ["session", "Session", { options: "sessions", required: true }];
-const on = ["on", "Day it happened, unless today", { type: "date" }];
+const on = ["on", "Date, if not today", { type: "date" }];
 const code = ["code", "Code", { required: true }];
 
 const forms = [
@@ -311,31 +311,31 @@ const forms = [
     "Note, deviation or adverse event",
     "Record",
     [
-      ["kind", "What it is", { values: ["note", "deviation", "adverse-event"], required: true }],
+      ["kind", "Kind", { values: ["note", "deviation", "adverse-event"], required: true }],
       ["text", "What happened", { required: true, long: true }],
       rater,
       session,
       on,
-      ["severity", "Severity, of an adverse event", { values: ["mild", "moderate", "severe"] }],
-      ["seriousness", "Seriousness, of an adverse event", { values: ["serious", "not serious"] }],
+      ["severity", "Severity (adverse event)", { values: ["mild", "moderate", "severe"] }],
+      ["seriousness", "Seriousness (adverse event)", { values: ["serious", "not serious"] }],
       ["relatedness", "Caused by the study?", { values: ["unrelated", "unlikely", "possible", "probable", "definite"] }],
-      ["onset", "Day it began, of an adverse event", { type: "date" }],
-      ["action", "What was done, of an adverse event", {}],
-      ["outcome", "What came of it, of an adverse event", {}],
+      ["onset", "Date of onset (adverse event)", { type: "date" }],
+      ["action", "Action taken (adverse event)", {}],
+      ["outcome", "Outcome (adverse event)", {}],
       who,
     ],
   ],
-  ["correct", "Correct a grade", "Correct", [needRater, needSession, code, ["grade", "What it should have been", { options: "grades", required: true }], who, why]],
+  ["correct", "Correct a grade", "Correct", [needRater, needSession, code, ["grade", "Correct grade", { options: "grades", required: true }], who, why]],
   [
     "answer",
     "Correct an answer",
     "Correct",
-    [needRater, needSession, ["question", "Question", { options: "questions", required: true }], ["answer", "What it should have been; nothing for none", {}], ["code", "Code, of a question about a model", {}], who, why],
+    [needRater, needSession, ["question", "Question", { options: "questions", required: true }], ["answer", "Correct answer; leave empty if there was none", {}], ["code", "Code, if the question is about a model", {}], who, why],
   ],
-  ["day", "Correct the day of a session", "Correct", [needRater, needSession, ["on", "Day it was held", { type: "date", required: true }], who, why]],
-  ["skip", "Leave a model without a grade, after a fault", "Record", [needRater, needSession, code, who, why]],
+  ["day", "Correct the date of a session", "Correct", [needRater, needSession, ["on", "Date on which it was held", { type: "date", required: true }], who, why]],
+  ["skip", "Leave a model without a grade after a fault", "Record", [needRater, needSession, code, who, why]],
   ["withdraw", "A rater has left", "Record", [needRater, on, who, why]],
-  ["unblind", "Unblind a code", "Record, and show the model", [code, rater, session, who, why]],
+  ["unblind", "Unblind a code", "Record and show the model", [code, rater, session, who, why]],
 ];
 
 const lists = {

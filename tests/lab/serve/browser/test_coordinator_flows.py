@@ -17,7 +17,7 @@ from tests.lab.serve.browser.visitors import LOST, Coordinator, Rater
 pytestmark = pytest.mark.slow
 
 NOTE = "Note, deviation or adverse event"
-SKIP = "Leave a model without a grade, after a fault"
+SKIP = "Leave a model without a grade after a fault"
 SIGNED = {"who": "MK", "why": "tapped the wrong line"}
 
 
@@ -51,7 +51,7 @@ def start(stage: Stage) -> Rater:
     page = stage.coordinator.page
     option = page.locator("#which option", has_text=re.compile(f"^{stage.rater}, "))
     page.locator("#which").select_option(option.get_attribute("value"))
-    press(page, "Start or go on")
+    press(page, "Start or resume")
     return stage.tablet()
 
 
@@ -61,7 +61,7 @@ def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twic
     coordinator = stage.coordinator
     second = stage.second_coordinator(timezone_id="Asia/Kolkata")
     second.tolerated = re.compile("status of 422")
-    sees(second, "No session runs")
+    sees(second, "No session is running")
     rater = start(stage)
     rater.wait_for("instructions")
     for each in (coordinator, second):
@@ -82,7 +82,7 @@ def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twic
     sees(coordinator, f"{stage.rater} grades practice")
     press(second.page, "Pause the session")
     rater.wait_for("over")
-    sees(coordinator, "No session runs")
+    sees(coordinator, "No session is running")
     sees(coordinator, "begun", "#sessions")
     start(stage)
     rater.go_until("break")
@@ -160,7 +160,7 @@ def test_a_grade_is_corrected_a_code_unblinded_and_what_happens_recorded(
     said = form(page, "A rater has left", **of, **SIGNED)
     expect(said).to_contain_text(f"{stage.rater} is withdrawn")
     press(page, "Pause the session")
-    sees(stage.coordinator, "No session runs")
+    sees(stage.coordinator, "No session is running")
     start(stage)  # which nobody who has left begins
     sees(stage.coordinator, "withdrawn")
 

@@ -252,7 +252,7 @@ def test_an_emergency_stop_ends_a_presentation_whose_stretches_are_shown(
     rater.begin()
     rater.wait_for("grade")
     rater.choose("3")
-    group = rater.page.get_by_role("group", name="The stretch it rests on")
+    group = rater.page.get_by_role("group", name="The stretch it is based on")
     group.locator("label").nth(2).tap()
     rater.tap("Save")
     rater.wait_for("ready")
@@ -271,7 +271,7 @@ def test_a_stop_between_presentations_ends_the_session_and_nobody_sees_anothers(
     rater.wait_for("instructions")
     rater.page.locator("#stop").tap()
     rater.wait_for("over")
-    assert "it can go on where it was" in rater.text
+    assert "the session can be resumed" in rater.text
     with rater.shown_anew():
         stage.coordinator.start(stage.rater)
     rater.go_until("grade")
@@ -294,7 +294,7 @@ def test_a_session_goes_on_after_its_server_was_stopped_and_killed(
     rater.go_until("grade")
     stage.server.end()
     rater.wait_for("over")
-    assert "it can go on where it was" in rater.text
+    assert "the session can be resumed" in rater.text
     stage.start_again()
     rater.wait_for("ready")
     rater.go_until("grade")

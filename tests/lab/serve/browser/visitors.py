@@ -174,7 +174,7 @@ class Rater(Visitor):
         self.screens.append(self.screen)
         match self.screen:
             case "instructions" | "break":
-                self.tap(re.compile("^Go on"))
+                self.tap(re.compile("^Continue"))
             case "ready":
                 self.tap("Begin")
             case "grade":
