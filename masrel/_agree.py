@@ -52,7 +52,7 @@ class Agreement:
     file : RatingsFile
         The ratings, and what was read of them.
     answer : Answer
-        The estimates with what is said of each.
+        The estimates with their notes.
     estimating : Estimating
         What was estimated, and how.
     reading : Reading
@@ -224,7 +224,7 @@ def agree(
     Raises
     ------
     RatingsError
-        If it is no table of ratings, or could be more than one.
+        If it is not a table of ratings, or could be more than one.
     ParameterError
         If an option is invalid, is given twice, or does not fit the ratings.
 

@@ -151,7 +151,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def _mode(path: Path) -> int | None:
-    """Return the permissions of what is replaced; refuse what is no file or kept so."""
+    """Return the permissions of the file replaced; refuse what is not a file."""
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:  # nothing, or a link to nothing, which is replaced
@@ -226,7 +226,7 @@ def check_inside(folder: Path, root: Path) -> None:
 
 
 def refuse_record(path: Path) -> None:
-    """Refuse an output in the place of a study's protocol, schedule, log and so on."""
+    """Refuse to write over a study's protocol, schedule, log and so on."""
     place = path.parent.resolve() / path.name
     for root in place.parents:
         parts = place.relative_to(root).parts

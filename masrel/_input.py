@@ -27,7 +27,7 @@ USUAL_NAMES = {
 def refuse(
     *rules: tuple[object, str], error: type[MasrelError] = ParameterError
 ) -> None:
-    """Raise for the first rule that is broken: whether it is, and what is said."""
+    """Raise for the first rule that is broken: whether it is, and the message."""
     for is_broken, sentence in rules:
         if is_broken:
             raise error(sentence)
@@ -62,7 +62,7 @@ def not_utf8(error: UnicodeDecodeError) -> str:
 
 
 def split_names(text: str) -> list[str]:
-    """Return the names between commas, some of which hold one, as ICC(2,1)."""
+    """Return the names between commas; a name may hold one, as ICC(2,1) does."""
     return [name.strip() for name in re.split(r",(?![^(]*\))", text)]
 
 

@@ -138,8 +138,8 @@ class PublishedScale:
     source : str
         Where it was published, and whose its wording is.
     meanings : mapping of str to str
-        What each grade means, in words of masrel's own. Empty where not even these
-        can stand in for the owner's form.
+        What each grade means, in masrel's own words. Empty if not even these can
+        replace the owner's form.
     angles : tuple of (str, str)
         Angles that belong to a grade, in degrees: their names, and what they are.
     """

@@ -50,7 +50,7 @@ class CodedRatings:
     Attributes
     ----------
     codes : ndarray of signed integers, shape (n_items, n_raters)
-        Position of each rating in `categories`; -1 where there is none.
+        Position of each rating in `categories`; -1 if it is missing.
     categories : tuple of str, int or float
         Declared categories in order.
     declared : bool
@@ -277,7 +277,7 @@ def _refuse_columns(names: Sequence[str], table: NDArray[Any]) -> None:
 
 
 def _is_long(roles: dict[str, int], labels: Sequence[Sequence[str]]) -> bool:
-    """Return whether columns, of which some have usual names, are one row a rating."""
+    """Return whether columns, some with usual names, have one row per rating."""
     sets, n_rows = list(map(set, labels)), len(labels[0])
     if len(sets) < 3 or len(roles) == 3:
         return len(sets) > 2
@@ -453,7 +453,7 @@ def check_frame(frame: Any, columns: Iterable[str], name: str = "frame") -> None
 
 
 def numbers(column: Any, name: str) -> NDArray[np.float64]:
-    """Return a column of a DataFrame as numbers; ``nan`` where there is none."""
+    """Return a column of a DataFrame as numbers; ``nan`` if missing."""
     try:
         values = column.to_numpy(np.float64, na_value=np.nan)
     except (TypeError, ValueError) as error:
@@ -536,7 +536,7 @@ class CountedRatings:
     Attributes
     ----------
     codes : ndarray of signed integers, shape (n_rows, n_raters)
-        Position of each rating in `categories`; -1 where there is none.
+        Position of each rating in `categories`; -1 if it is missing.
     freq : ndarray of int, shape (n_rows,)
         How often each row occurs.
     categories : tuple of str, int or float
@@ -744,7 +744,7 @@ def complete_rows(ratings: CountedRatings) -> CountedRatings:
 
 
 def refuse_measurements(ratings: CodedRatings | CountedRatings) -> None:
-    """Refuse numbers of which hardly any two are alike, where only alike ones agree."""
+    """Refuse numbers that are nearly all different where only equal ones agree."""
     n_known, n_ratings = len(ratings.categories), int((ratings.codes >= 0).sum())
     refuse(
         (
@@ -952,7 +952,7 @@ def _column_categories(
 
 
 def rating_values(ratings: Any, categories: Sequence[Label] | None) -> Floats:
-    """Return ratings as numbers, ``nan`` where there is none."""
+    """Return ratings as numbers, ``nan`` if missing."""
     # -> (n_items, n_raters)
     coded = code_ratings(ratings, categories)
     known = coded.categories

@@ -73,7 +73,7 @@ class Features:
     def summed(self, freq: Integers) -> tuple[Floats, Integers]:
         """Return sums over rows that occur so often each, and how often rows matter.
 
-        A row whose features are all 0 does not: to the coefficient it is no item.
+        A row whose features are all 0 does not: to the coefficient it is not an item.
         """
         # -> (m + n,), (n_rows,)
         # a sum of thousands of shares would be rounded as often: in parts of the rows,
@@ -161,7 +161,7 @@ def estimate(
     population: int | None = None,
     why: Why | None = None,
 ) -> Estimate:
-    """Estimate a kappa with its standard error, or say why there is none.
+    """Estimate a kappa with its standard error, or the reason if it has none.
 
     `why` takes weights, D_o and D_e, and returns the reason why they make no value.
     """
@@ -230,7 +230,7 @@ def divide(numerator: Floats, denominator: Floats, none: float = math.nan) -> Fl
 
 
 def check_level(level: float, name: str = "level") -> None:
-    """Check the level of an interval, or another share that is none or all of it."""
+    """Check the level of an interval, or another share above 0 and below 1."""
     is_number = isinstance(level, int | float | np.integer | np.floating)
     # a level so near to 1 that its upper quantile is that of 1 has no ends
     is_level = is_number and 0.0 < level < 1.0 and 0.5 + 0.5 * level < 1.0

@@ -48,13 +48,13 @@ def is_missing(label: object) -> bool:
 
 
 class SetText(str):
-    """Text that stands for a set, in which no separator needs to be looked for."""
+    """Text that means a set, in which no separator needs to be looked for."""
 
     __slots__ = ()
 
 
 def text_of_set(labels: Set[Any]) -> SetText:
-    """Return the text that stands for a set of labels: its elements in order."""
+    """Return the text that means a set of labels: its elements in order."""
     elements = sorted(map(str, labels))
     if any(SET_SEPARATOR.strip() in element for element in elements):
         raise RatingsError(

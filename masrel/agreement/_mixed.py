@@ -168,7 +168,7 @@ class Components:
 
 
 def components(values: Floats, *, has_raters: bool) -> Components | str:
-    """Return the variances of a table with gaps, or why there are none."""
+    """Return the variances of a table with gaps, or why they are undefined."""
     # values (n_items, n_raters), nan where there is no rating; without raters these
     # are part of the residual
     rated = ~np.isnan(values)

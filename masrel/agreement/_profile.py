@@ -2,7 +2,7 @@
 
 A rating is μ + item + rater + residual, all three random and normal, with variances of
 0 or more. What a table says is the deviance, -2 log of the restricted likelihood, at
-a = 1 + k σ²_items/σ²_residual and x = 1 + n σ²_raters/σ²_residual. Of a complete table
+a = 1 + k σ²_items/σ²_residual and x = 1 + n σ²_raters/σ²_residual. In a complete table
 these are ratios of expected mean squares, and the mean squares are all that counts.
 """
 

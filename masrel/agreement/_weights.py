@@ -1,7 +1,7 @@
 """Weights of disagreement between the categories of a declared scale.
 
 In: a name or a matrix, and the declared categories. Out: `Weights`, which hold
-v = 1 - w as a matrix, or as an operator of categories so many that none is made.
+v = 1 - w as a matrix, or as an operator if there are too many categories for one.
 """
 
 import math
@@ -31,7 +31,7 @@ WeightName = Literal[
 """Names of the weights."""
 
 MANY = 2000
-"""Categories of which a matrix is made; of more, none is."""
+"""The most categories for which a matrix is made."""
 
 NO_PAIR = "no item has ratings of two raters"
 
@@ -148,8 +148,8 @@ class Weights:
     n_categories : int
         Declared categories.
     v : ndarray, shape (n_categories, n_categories), or Distances
-        The disagreement of every two; an operator in its place where categories are
-        more than 2000.
+        The disagreement of every two; an operator instead if there are more than 2000
+        categories.
     reason : str or None
         Why the scale has no such weights, or None; no coefficient is defined then.
     counts_misses : bool

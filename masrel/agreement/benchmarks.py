@@ -95,7 +95,7 @@ def p_value(
     -----
     UndefinedStatisticWarning
         If the estimate or its standard error is undefined, or the error is 0: no item
-        moves the estimate, which is no certainty.
+        moves the estimate, which does not make it certain.
 
     Notes
     -----

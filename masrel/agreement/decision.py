@@ -85,8 +85,8 @@ def d_study(
     sizes : mapping of str to int
         Levels of each facet; of a nested one within each level of the facet above.
     fixed : sequence of str, optional
-        Facets that keep their levels, of which nothing is generalized; those of the
-        study unless given.
+        Facets that keep their levels and are not generalized over; those of the study
+        unless given.
     cut : float, optional
         A grade at which persons are told apart, for Φ(λ).
 
@@ -98,8 +98,8 @@ def d_study(
     Raises
     ------
     ParameterError
-        If a facet is missing or unknown, a number is below 1, the cut is no number, or
-        nothing is left that could be an error.
+        If a facet is missing or unknown, a number is below 1, the cut is not a number,
+        or no component is left that could be an error.
 
     Warns
     -----
@@ -240,7 +240,8 @@ def cheapest_design(
     Raises
     ------
     ParameterError
-        If the aim or the prices are none, or no design that is looked at is enough.
+        If the aim or the prices are invalid, or no design that is tried reaches the
+        aim.
 
     Examples
     --------
@@ -342,8 +343,8 @@ def design_precision(
     study : GStudy
         Components that are taken to be true, such as those of a pilot.
     sizes : mapping of str to int
-        Levels of each facet in the mean that is judged; of a nested one within each
-        level of the facet above. The study to come has as many, but two at least.
+        Levels of each facet in the mean; for a nested facet, within each level of the
+        facet above. The future study has as many, but at least two.
     n_persons : int
         How many are measured, each at every level.
     aim : float, optional

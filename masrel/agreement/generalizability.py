@@ -124,7 +124,7 @@ class GStudy:
     in_mean: Mapping[str, float] = field(compare=False, repr=False)  # Σ n²/N²
 
     def d_study(self, **sizes: int) -> DStudy:
-        """Return `decision.d_study` of so many levels of each facet.
+        """Return `decision.d_study` with these numbers of levels of each facet.
 
         Parameters
         ----------
@@ -244,19 +244,19 @@ def g_study(
     Raises
     ------
     ParameterError
-        If facets are none or more than three, `nested` or `fixed` are not of them, or
-        `level` or `rng` is none.
+        If there are no facets or more than three, `nested` or `fixed` names another
+        facet, or `level` or `rng` is invalid.
     RatingsError
-        If a column is missing, grades are no numbers, a column never varies, or
-        effects cannot be told apart.
+        If a column is missing, grades are not numbers, a column never varies, or
+        effects cannot be separated.
 
     Notes
     -----
     Of a balanced design components solve the equations of expected mean squares. They
     may be negative, which says that they are small against their error; reliability
-    takes them for 0. Of a design with gaps they are those of highest restricted
-    likelihood, 0 at least. Beyond 5 000 levels beside those of the largest column, and
-    where there is no residual, Henderson's first method takes its place.
+    takes them as 0. For a design with gaps they maximise the restricted
+    likelihood and are at least 0. Henderson's first method is used instead if there are
+    more than 5 000 levels besides those of the largest column, or no residual.
 
     Intervals are read from draws of components: generalized confidence intervals, for
     which χ² takes the place of each mean square's error; of moments, normal draws with

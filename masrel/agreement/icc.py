@@ -148,18 +148,18 @@ def icc(
 
     Notes
     -----
-    A complete table has mean squares. Where its total variance is estimated as less
+    A complete table has mean squares. If its total variance is estimated as less
     than 0, which takes items that hardly differ, the formula's value lies outside
-    [-1, 1] and there is no interval. Where the variance of items alone is, so is the
-    value; the profile likelihood, of variances of 0 or more, leaves it out, and the
+    [-1, 1] and there is no interval. If only the variance of items is negative, so is
+    the value; the profile likelihood, of variances of 0 or more, leaves it out, and the
     interval is drawn out to it. The interval of ICC(A,k) is that of ICC(A,1) stepped
     up by Spearman and Brown's formula.
 
     Where ratings are missing, all that there are count: the variances of items, raters
     and residual are estimated by restricted maximum likelihood [3]_, each 0 or more;
     k is the number of raters of the table; the interval is the profile likelihood's,
-    and its notes have the variances. Items and raters without any rating are no part
-    of it.
+    and its notes have the variances. Items and raters without any rating are left
+    out.
 
     References
     ----------
@@ -637,7 +637,7 @@ def _features(
 def _disagreements(
     form: IccForm, sums: NDArray[Any], _values: object
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Return D_o and D_e, of which 1 - D_o/D_e is the value, and its slope."""
+    """Return D_o and D_e, for the value 1 - D_o/D_e, and its slope."""
     anova = _Anova.of_sums(sums)
     d_e = anova.denominator(form)[..., None]
     d_o = d_e - (anova.items - anova.error(form))[..., None]
@@ -704,7 +704,7 @@ def _without_gaps(
 def _ends(
     anova: _Anova, form: IccForm, level: float, by_f: bool
 ) -> tuple[float, float, str | None]:
-    """Return the ends of the interval, and why there are none."""
+    """Return the ends of the interval, or why they are undefined."""
     from scipy.special import fdtri
 
     k, error, upper = anova.k, anova.error(form), 0.5 + 0.5 * level
@@ -806,7 +806,7 @@ def _stepped_up(rho: float, k: int) -> float:
 
 
 def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, float, str | None]:
-    """Return W and its standard error, or why there is none."""
+    """Return W and its standard error, or why it is undefined."""
     n, m = values.shape
     if why := _too_few(values):
         return math.nan, math.nan, undefined("Kendall's W", why)

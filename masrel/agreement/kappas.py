@@ -605,8 +605,8 @@ def conger_kappa(
     Notes
     -----
     Chance agreement is that of two different raters, averaged over all pairs, each
-    with the shares of its own ratings. Of two raters with complete ratings it is
-    Cohen's kappa. A rater without any rating has no shares, and is left out.
+    with the shares of its own ratings. With two raters and complete ratings it is
+    Cohen's kappa. A rater without any rating has no shares and is left out.
 
     References
     ----------

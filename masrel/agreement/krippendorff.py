@@ -261,7 +261,7 @@ def _ratio(categories: Sequence[Label]) -> Floats:
         ),
         (
             sums_to_zero(values),
-            "metric: ratio needs values of which no two sum to 0, got "
+            "metric: ratio needs values that never sum to 0 in pairs, got "
             f"{', '.join(map(str, values.tolist()))}",
         ),
     )

@@ -307,7 +307,7 @@ def _cautions(
 
 
 def _slope(averages: Floats, differences: Floats) -> tuple[float, float, str | None]:
-    """Return the slope of the line, its HC3 error, and why there is none."""
+    """Return the slope of the line, its HC3 error, or why it is undefined."""
     n = len(averages)
     off = averages - averages.sum() / max(n, 1)
     sum_of_squares = max(float(off @ off), 1e-300)
@@ -584,8 +584,8 @@ def limits_by_clusters(
         Takes rows like these and returns what either of the two returns, not of the
         kind proportional.
     clusters : str
-        Name of the column of clusters, such as patients of whom several joints were
-        measured. Items of one cluster may be alike; clusters are independent.
+        Name of the column of clusters, such as patients with several measured joints.
+        Items of one cluster may be alike; clusters are independent.
     level : float, optional
         Level of the intervals.
 

@@ -68,7 +68,7 @@ def unitizing_alpha(
     ----------
     spans : iterable of (observer, category, begin, length), or DataFrame
         One row a unit; begin and length are whole numbers, such as characters or
-        milliseconds. Where there are several documents, rows begin with the document.
+        milliseconds. If there are several documents, rows begin with the document.
         A row whose category is None says that an observer looked at it all.
     begin : int, optional
         Where every continuum begins.
@@ -88,7 +88,7 @@ def unitizing_alpha(
         If rows are not such units, a unit lies outside its continuum, two units of an
         observer and a category overlap, or no two observers annotated a document.
     ParameterError
-        If `level` is no level.
+        If `level` is not a level.
 
     Warns
     -----
@@ -192,7 +192,7 @@ def span_f1(
     -----
     F1 is the share of the spans of both, or of their tokens, that match: with as many
     matches on either side, 2/(1/precision + 1/recall). Counts are summed over documents
-    and categories first. Of two spans of one observer that overlap with one of the
+    and categories first. If two spans of one observer overlap with one of the
     other, all three match.
 
     Intervals leave out one document at a time, with Student's t on the logit.

@@ -422,7 +422,7 @@ _EXPLANATIONS = {
 
 
 def note(kind: str, **values: object) -> str:
-    """Return a note of a kind; a level in it is said in percent."""
+    """Return a note of a kind; a level in it is given in percent."""
     if isinstance(level := values.get("level"), float):
         values["level"] = f"{100.0 * level:g}"
     if kind in _TEXTS:

@@ -538,7 +538,7 @@ _BELOW = {
 
 
 def _notes(name: str, rows: Sequence[Row], questions: Questions) -> list[str]:
-    """Return what stands below the table of an answer."""
+    """Return the notes below the table of an answer."""
     level, is_of_humans = questions.level, name == "humans"
     tests = dict.fromkeys(_TESTS[row["test"]] for row in rows if is_of_humans)
     values = {

@@ -1,7 +1,7 @@
 """Further questions about a file of ratings, and the rows that answer them.
 
 In: a `RatingsFile` and how estimates are made. Out: an `Answer`, whose rows are as the
-JSON has them; what tables show otherwise stands beside them.
+JSON has them; what tables show differently is beside them.
 """
 
 import math

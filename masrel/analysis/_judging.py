@@ -29,7 +29,7 @@ class Judging:
     truth : bool
         Whether the class of each item is estimated without labels.
     order : str or None
-        The column of which answer was shown first; grades are the answers preferred.
+        The column with the answer shown first; grades are the answers preferred.
     require : tuple of str
         Gates on numbers of judges and rates.
 

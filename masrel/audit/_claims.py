@@ -243,7 +243,7 @@ class Claim:
 
     @property
     def rules(self) -> tuple[Rule, ...]:
-        """The rules that its rounding stands for."""
+        """The rules that its rounding means."""
         return tuple(rule for rule in RULES if self.rounding in (rule, "either"))
 
     @property

@@ -91,8 +91,8 @@ class ConsistentTables:
     n_tables : int or None
         Tables that give both numbers, 0 if none does; None if it cannot be told.
     status : str
-        ``"exact"``: there are so many; ``"at least"``: there may be more, since no
-        more than 10 000 are counted; ``"cannot tell"``: the bound on work was met
+        ``"exact"``: the number is exact; ``"at least"``: there may be more, since at
+        most 10 000 are counted; ``"cannot tell"``: the bound on work was met
         before a table was met.
     examples : tuple of tables
         Up to ten of them, each a tuple of rows. Two raters: categories of the first
@@ -238,8 +238,8 @@ def consistent_tables(
     n_categories : int
         Categories of the scale, used or not, 2 to 20.
     n_raters : int, optional
-        Raters of each item. Of two, kappa is Cohen's; of more it is Fleiss', and the
-        agreement is that of pairs of raters.
+        Raters of each item. With two, kappa is Cohen's; with more it is Fleiss', and
+        the agreement is that of pairs of raters.
     agreement : str, optional
         The agreement in percent as it is printed, without a sign: its decimals count.
     kappa : str, optional
@@ -262,11 +262,11 @@ def consistent_tables(
 
     Notes
     -----
-    Raters and categories are told apart, and so are items of more than two raters: a
-    table and its transpose are two. Tables of which kappa is undefined are not counted
-    where a kappa is printed. Of two raters all tables are decided, in integers, unless
-    the bound on work is met. Of more raters this holds for few items; with many, a
-    part of the tables is tried, and where none of them fits it cannot be told.
+    Raters and categories are distinguished, and so are items of more than two raters: a
+    table and its transpose count as two. Tables with an undefined kappa are not counted
+    if a kappa is printed. With two raters all tables are decided, in integers, unless
+    the bound on work is met. With more raters this holds for few items; with many, a
+    part of the tables is tried, and if none of them fits, the answer is unknown.
 
     Examples
     --------

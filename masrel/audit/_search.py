@@ -52,7 +52,7 @@ Step = tuple[
 def search_tables(
     claim: Claim, *, n_made: int = N_EXAMPLES
 ) -> "SquareTables | ItemTables":
-    """Search the tables of a claim with named weights, and make so many of them."""
+    """Search the tables of a claim with named weights, and make up to `n_made`."""
     if claim.n_raters == 2:
         return SquareTables(claim).run(n_made)
     first = ItemTables(claim, _FIRST_VISITED_ITEMS).run(n_made)
@@ -100,7 +100,7 @@ class _Search(ABC):
 
     @abstractmethod
     def steps(self) -> Iterator[Step]:
-        """Yield the tables that there are, some at a time."""
+        """Yield the tables, some at a time."""
 
     def run(self, n_made: int) -> Self:
         """Search until all was looked at, or enough was met, or work ended."""
@@ -332,9 +332,9 @@ class ItemTables(_Search):
     Of a table only two sums matter: disagreement, which adds up over items, and how
     often each category was chosen in all. Items are added one by one; tables that have
     both sums alike are one state from there on, which keeps how many they are. A
-    printed percentage drops states from which it cannot be reached any more. Where the
-    states get too many for the bound on work, an even choice of them is gone on with:
-    what is counted then is a part of the tables, and nothing follows from none.
+    printed percentage drops states from which it can no longer be reached. If there are
+    too many states for the bound on work, an even choice of them is kept: then only a
+    part of the tables is counted, and nothing follows if none fits.
 
     States are columns: the sums as one number (key), how many tables have them, one of
     the states they come from, and the item that was added to it.

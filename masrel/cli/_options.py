@@ -295,7 +295,7 @@ Report = Callable[[int, int], None]
 
 @contextmanager
 def progress(description: str, unit: str, *, is_quiet: bool) -> Iterator[Report]:
-    """Show a bar on stderr, or a line every ten seconds where that is no terminal."""
+    """Show a bar on stderr, or a line every ten seconds if that is not a terminal."""
     start = last = time.monotonic()
 
     def line(n_made: int, n_expected: int) -> None:

@@ -26,7 +26,7 @@ _HELD = 1e-280  # share of the largest above which a sum lost nothing to underfl
 
 
 def log_convolve(left: Floats, right: Floats) -> Floats:
-    """Multiply two polynomials of which the logarithms of coefficients are known."""
+    """Multiply two polynomials, given the logarithms of their coefficients."""
     # Floats hold some 1300 nats around the largest term. Times λ^t for several λ every
     # term is near the largest once: coefficients are log-concave or nearly so, and
     # the slope of a product's logarithm is among those of its factors'.

@@ -160,7 +160,7 @@ class IntervalProblem:
         """Return an interval by Student's t, or by the normal of infinite degrees.
 
         With `lowest` it is symmetric on the logit of the place between that and 1, and
-        on Fisher's z where there is no lowest; at either end itself there is none.
+        on Fisher's z where there is no lowest; at either end itself it is undefined.
         """
         half = student_t(self.level, df) * error
         low, high = self.value - half, self.value + half
@@ -340,7 +340,7 @@ def _of_rows(
 def _by_nodes(formula: Formula, line: Line) -> Formula | None:
     """Return the formula with all ratings shared out among three nodes.
 
-    Where v is the square of a distance, the nodes stand for any number of grades.
+    Where v is the square of a distance, the nodes represent any number of grades.
     """
     if formula.needs_categories or (nodes := line.nodes()) is None:
         return None
@@ -449,5 +449,5 @@ def warn_small(
 
 
 def singular(what: str) -> str:
-    """Return for one what is said in the plural."""
+    """Return the singular of a phrase in the plural."""
     return re.sub(r"s\b", "", what, count=1)  # "items with ratings": the first alone

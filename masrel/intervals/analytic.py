@@ -88,7 +88,7 @@ def analytic(
         Take the standard error that another program prints in place of ours; see Notes.
     clusters : sequence of labels, length n_items, optional
         The cluster of every item, such as the patient of a site: n are then clusters.
-        Each item by itself when not given.
+        By default each item is independent.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def analytic(
     "over_n" is the delta method's with n in place of n - 1: for Cohen's kappa Fleiss,
     Cohen and Everitt's [2]_, which SPSS and the R packages vcd and psych print (psych's
     of weighted kappa has a fault), with "normal" their interval. "irrcac" is what the
-    package irrCAC prints, also of Krippendorff's alpha; but for alpha it is ours where
+    package irrCAC prints, also for Krippendorff's alpha; but for alpha it is ours where
     every item has at least two ratings. "spss" is "over_n" for Cohen's kappa, and for
     Fleiss' kappa that of the hypothesis that kappa is 0 [3]_.
 

@@ -62,8 +62,8 @@ def bootstrap(
     ratings : nested sequence, array_like or DataFrame
         What the coefficient takes.
     target : {"items", "raters", "both"}
-        What a new study would draw anew, and so what is resampled; for "both" items
-        and raters, each by themselves [3]_.
+        Population that the interval is about, and so what is resampled: other items,
+        other raters, or both; for "both", items and raters separately [3]_.
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional
@@ -127,7 +127,7 @@ def bootstrap(
     error of every resample, from exact derivatives; where that is 0, and the resample
     differs from the estimate, the ratio is infinite.
 
-    The Monte Carlo error is that of the quantile of so many draws.
+    The Monte Carlo error is that of the quantile of this number of draws.
 
     References
     ----------
@@ -280,7 +280,7 @@ def _resampled(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Units:
-    """What is drawn: items, clusters, raters, or items and raters by themselves."""
+    """What is drawn: items, clusters, raters, or items and raters separately."""
 
     # how often each distinct unit is there, of one sample or of two
     freqs: tuple[Integers, ...] = field(repr=False)
@@ -400,7 +400,7 @@ def _ends(
     resamples: "_Resamples",
     error: float,
 ) -> tuple[tuple[float, float], tuple[float, float]] | str:
-    """Return the ends and their Monte Carlo errors, or why there are none."""
+    """Return the ends and their Monte Carlo errors, or why they are undefined."""
     # [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap.
     # [2] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
     # Application.

@@ -129,11 +129,12 @@ def estimate(
     ratings : nested sequence, array_like or DataFrame
         What the coefficient takes.
     target : {"items", "raters", "both"}
-        What a new study would draw anew. There is no default.
+        Population that the interval is about: other items, other raters, or both.
+        There is no default.
     method : {"auto", "analytic", "jackknife", "bootstrap", "posterior"}, optional
-        Kind of interval; "auto" chooses by target and size. Its rule has a name, by
-        which it can be had again when there is a newer one, such as "auto-2026.1": the
-        interval's `method` says it, and a note what was chosen and why. The functions
+        Kind of interval; "auto" chooses by target and size. Each rule has a name, such
+        as "auto-2026.1", with which it can be used after a newer one exists: the
+        interval's `method` names it, and a note says what was chosen and why. The functions
         of the same names have more options.
     categories : sequence, optional
         The declared scale in order.
@@ -149,9 +150,9 @@ def estimate(
     rng : Generator or int, optional
         Source of randomness, for methods that draw.
     clusters : sequence of labels, length n_items, optional
-        The cluster of every item, such as the patient of a site: what a new study
-        would draw anew, with `target` "items" and any `method` but "posterior". Each
-        item by itself when not given.
+        The cluster of every item, such as the patient of a site: the interval is then
+        about other clusters, with `target` "items" and any `method` but "posterior".
+        By default each item is independent.
 
     Returns
     -------

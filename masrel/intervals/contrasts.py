@@ -476,8 +476,8 @@ def differences(
         Ratings of the same items in the same order, such as those of several pairs of
         raters, occasions or methods; the keys of a mapping name them.
     clusters : sequence of labels, length n_items, optional
-        The cluster of every item, such as the patient of a site; each item by itself
-        when not given.
+        The cluster of every item, such as the patient of a site. By default each item
+        is independent.
     categories : sequence, optional
         The declared scale in order; should be given, so that all have the same.
     weights : str or array_like, optional
@@ -518,8 +518,8 @@ def differences(
     The covariance of two coefficients is (n - 1)/n Σ_c d_c d'_c over n clusters c, or
     items, with d_c how far the coefficient without the cluster lies from the mean of
     these: the jackknife's, which is that of [1]_ where there are many. An item without
-    ratings in one of the sets adds nothing to that one. Of two sets the difference, its
-    error, interval and p-value are those of `difference`.
+    ratings in one of the sets adds nothing to that one. For two sets the difference,
+    its error, interval and p-value are those of `difference`.
 
     References
     ----------
@@ -696,8 +696,8 @@ def _largest_t(contrasts: Floats, df: float) -> tuple[Callable[[float], float], 
     """Return the probability that the largest |a_k·Z|/S exceeds a number, and a rank.
 
     Z is normal and S² a χ² over its degrees of freedom, so that |Z|²/(p S²) has an F
-    distribution whatever the direction of Z: only directions are summed over. Of one
-    or two dimensions that is exact; of more the directions are those of a lattice,
+    distribution whatever the direction of Z: only directions are summed over. In one
+    or two dimensions that is exact; in more the directions are those of a lattice,
     the same every time.
     """
     # Takes contrasts a (n_statistics, n_dimensions), of unit length
@@ -775,8 +775,8 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
     -----
     It takes any coefficient, weights and number of raters, and any standard error:
     that of clustered items, too. It needs large groups: with 40 to 100 items each it
-    rejects a true hypothesis in some 7 % of studies instead of 5. Of two raters and
-    two categories `donner_test` holds its level in smaller ones.
+    rejects a true hypothesis in some 7 % of studies instead of 5. For two raters and
+    two categories `donner_test` keeps its level in smaller ones.
 
     References
     ----------
@@ -944,7 +944,7 @@ def _tested(
     statistic: float = math.nan,
     reason: str | None = None,
 ) -> Significance:
-    """Return a statistic with its p-value, or warn why there is none."""
+    """Return a statistic with its p-value, or warn why it is undefined."""
     if reason is not None:
         statistic = math.nan
         undefined(_TITLES[name], reason)

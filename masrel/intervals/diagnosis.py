@@ -152,7 +152,7 @@ def diagnose(
         function.
     target : {"items"}, optional
         "items" for intervals that generalise to other items, graded by these raters;
-        without it there are none. Each interval is for one pair or rater alone.
+        without it no interval is given. Each interval is for one pair or rater alone.
     raters : sequence of str, optional
         What the raters are called; the columns of a DataFrame, else their places.
     reference : str or int, optional
@@ -166,7 +166,7 @@ def diagnose(
         Krippendorff's difference function in place of weights; see
         `krippendorff_alpha`, which alone takes one.
     level : float, optional
-        Nominal level, of each interval by itself.
+        Nominal level of each interval separately.
 
     Returns
     -------

@@ -43,7 +43,8 @@ def jackknife(
         What the coefficient takes. For test-retest agreement an item is left out
         with the ratings of all its raters.
     target : {"items", "raters", "both"}
-        What a new study would draw anew, and so what is left out.
+        Population that the interval is about, and so what is left out: items, raters,
+        or both.
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional
@@ -55,7 +56,7 @@ def jackknife(
         Nominal level.
     clusters : sequence of labels, length n_items, optional
         The cluster of every item, such as the patient of a site: what is left out then,
-        with `target` "items". Each item by itself when not given.
+        with `target` "items". By default each item is independent.
 
     Returns
     -------
@@ -80,7 +81,7 @@ def jackknife(
 
     Notes
     -----
-    Items with a single rating are left out in turn, too, where they tell of chance
+    Items with a single rating are left out in turn, too, where they affect chance
     agreement; but (n - 1)/n and the degrees of freedom count items with a pair of
     ratings, and raters of a pair.
 

@@ -89,8 +89,8 @@ def posterior(
         with "table" every cell. Unless given, the prior of the table is worth 1.5
         items, half of it on pairs that agree; so is that of the patterns.
     n_draws : int, optional
-        Draws, where they are needed: by "patterns", by the table of more than two
-        categories, and of what is no function of ρ alone.
+        Number of draws, where they are needed: by "patterns", by the table of more than
+        two categories, and for what is not a function of ρ alone.
     rng : Generator or int, optional
         Where randomness comes from, if any is needed; an integer is recorded as the
         seed. Without it a fresh seed is drawn and recorded.
@@ -98,8 +98,8 @@ def posterior(
     Returns
     -------
     Interval
-        A central credible interval, its `distribution` the density. Where it was
-        drawn, with the Monte Carlo error of each endpoint.
+        A central credible interval, with the density as its `distribution`, and with
+        the Monte Carlo error of each endpoint if it was drawn.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def posterior(
     -----
     Dirichlet-multinomial: an item's category probabilities are Dirichlet(A π) and its
     ratings multinomial; ρ = 1 / (1 + A). π is integrated out in closed form, and ρ by
-    quadrature, to about 1e-12 [1]_. Of raters alike, Cohen's, Conger's and Light's
+    quadrature, to about 1e-12 [1]_. For raters alike, Cohen's, Conger's and Light's
     kappa are ρ as well; others depend on ρ and π, which are drawn.
 
     Table: the probabilities of the pairs of categories are Dirichlet. Percent agreement

@@ -97,7 +97,7 @@ def score_test(
     Raises
     ------
     ParameterError
-        If b, c and n are no such counts, or an option is outside its range.
+        If b, c and n are not such counts, or an option is outside its range.
 
     Warns
     -----

@@ -102,11 +102,11 @@ class HumanBesideJudge:
         How it was tested.
     p_value : float
         Of the hypothesis that the human's share exceeds the judge's by at least
-        epsilon; ``nan`` when undefined, which is no rejection.
+        epsilon; ``nan`` when undefined, which does not reject it.
     p_adjusted : float
         The same by Benjamini and Yekutieli's method for all humans.
     is_rejected : bool
-        Whether it is rejected: the judge is no worse than the human by epsilon.
+        Whether it is rejected: the judge is not worse than the human by epsilon.
     reason : str or None
         Why the p-value is undefined, or None.
     """
@@ -389,7 +389,7 @@ class _Graded:
         return np.asarray(signs * self.rated)
 
     def _to(self, k: int, grades: NDArray[Any]) -> NDArray[Any]:
-        """Return how near grades are to those of a human; 0 where there is none."""
+        """Return how near grades are to those of a human; 0 if those are missing."""
         return self.nearness(grades, self.humans[:, k, None]) * self.rated[:, k, None]
 
     def cluster_codes(self, clusters: Grades | None) -> Integers:
@@ -550,7 +550,7 @@ def advantage(
     judge : mapping or Series
         The grade of the judge by item.
     target : {"items", "raters", "both"}
-        What a new study would draw anew: items, humans, or both.
+        Population that the interval is about: other items, other humans, or both.
     score : {"accuracy", "neg_rmse"} or tuple, optional
         How near grades are; see `alternative_annotator_test`.
     min_items : int, optional
@@ -691,7 +691,7 @@ def advantage_differences(
     judges : mapping of mappings, or DataFrame
         The grades of each judge by item; two judges or more.
     target : {"items", "raters", "both"}
-        What a new study would draw anew: items, humans, or both.
+        Population that the interval is about: other items, other humans, or both.
     score : {"accuracy", "neg_rmse"} or tuple, optional
         How near grades are; see `alternative_annotator_test`.
     min_items : int, optional
@@ -788,7 +788,7 @@ class _LeftOut:
     interval: Interval  # without ends
 
     def error(self, contrast: Floats) -> tuple[float, str | None]:
-        """Return the standard error of a contrast of judges; or why there is none."""
+        """Return the standard error of a contrast of judges, or why it is undefined."""
         variance = sum(_variance_of(contrast @ of, of.shape[1]) for of in self.moved)
         if variance > 0.0:
             return math.sqrt(variance), None

@@ -58,7 +58,7 @@ class DawidSkene:
         Share of each class among the items, π.
     confusion : ndarray, shape (n_raters, n_categories, n_categories)
         How probable it is that a rater gives a grade (last axis) to an item of a class
-        (middle axis), θ; ``nan`` for a class of which the rater has graded no item.
+        (middle axis), θ; ``nan`` for a class in which the rater has graded no item.
     accuracy : ndarray, shape (n_raters,)
         How probable it is that a rater gives an item its class, Σ π_k θ_kk.
     posterior : ndarray, shape (n_items, n_categories)
@@ -178,8 +178,8 @@ def dawid_skene(
         One row a rating; a rater may grade an item several times. A frame has columns
         named item, rater and grade, or as is usual. Rows without a grade are left out.
     start : {"majority"}, optional
-        Answer with the maximum to which the shares of votes of each item lead. Whether
-        another start ends higher is said, and `higher` has the best.
+        Answer with the maximum to which the shares of votes of each item lead. A note
+        says whether another start ends higher, and `higher` has the best.
 
     Returns
     -------
@@ -195,7 +195,7 @@ def dawid_skene(
 
     Notes
     -----
-    Raters are independent given the class. Where they err together, the model takes
+    Raters are independent given the class. If they err together, the model takes
     their common error for the truth: nothing in the ratings shows it.
 
     Classes are named after grades by the majority start. Each item needs three ratings,
@@ -391,7 +391,7 @@ def _result(
 
 
 def _doubts(votes: _Votes, posterior: Floats, has_none: Any) -> tuple[str, ...]:
-    """Return which classes no item has, and of which a rater has graded none."""
+    """Return which classes no item has, and which a rater has never graded."""
     best, names = posterior.argmax(axis=1), votes.categories
     pairs = listed(
         f"{votes.raters[j]!r} of class {names[k]!r}" for j, k in np.argwhere(has_none)
@@ -434,7 +434,7 @@ def dawid_skene_intervals(
     level : float, optional
         Nominal level.
     n_resamples : int, optional
-        Draws of the posterior, at least 320, in chains of which there are 16.
+        Number of draws of the posterior, at least 320, in 16 chains.
     rng : Generator or int, optional
         Where randomness comes from; an integer is recorded as the seed. Without it a
         fresh seed is drawn and recorded.
@@ -465,7 +465,7 @@ def dawid_skene_intervals(
     each item is drawn, then π and each row of each θ from Dirichlet distributions. The
     prior is uniform for π; of each rater, class and grade it has half a rating, and one
     more of the right grade: without it classes of few items change places. All chains
-    begin at the majority solution, which names the classes. Where an estimate is 0 or
+    begin at the majority solution, which names the classes. If an estimate is 0 or
     1, so is that end of its interval. A bootstrap of items covers less: it has no
     spread in an empty cell.
 
@@ -600,8 +600,8 @@ class EffectiveNumber:
     n_judges, n_items : int
         Number of judges, and of items.
     left_out : tuple of (judge, judge)
-        Pairs without a correlation, which are not in the mean: a judge of theirs makes
-        no error on their items, or only errors.
+        Pairs without a correlation, which the mean leaves out: one of the two judges
+        makes no error on their items, or only errors.
     level : float
         Nominal level of the interval.
     method : str
@@ -632,7 +632,7 @@ def effective_number(errors: object, *, level: float = 0.95) -> EffectiveNumber:
     ----------
     errors : mapping of judge to errors, array_like (n_judges, n_items), or DataFrame
         1 where a judge is wrong and 0 where right, item by item in one order; a
-        DataFrame has a column a judge.
+        DataFrame has one column per judge.
     level : float, optional
         Nominal level of the interval.
 

@@ -37,8 +37,8 @@ class JudgePlan:
     advantage : float
         Advantage of the judge, on average.
     difference : float
-        By how much a human's share exceeds the judge's, in the mean; the judge can
-        pass where it is less than epsilon.
+        By how much a human's share exceeds the judge's on average; the judge can pass
+        if it is less than epsilon.
     tied : float
         Share of items where human and judge are as near to the others.
     seed : int
@@ -79,9 +79,9 @@ def judge_plan(
     judge_accuracy : float, optional
         How often the judge has; as often as the humans when not given.
     n_categories : int, optional
-        Grades that there are.
+        Number of different grades.
     n_items : int, optional
-        Items, where it is asked how often the judge passes with so many.
+        Number of items, to find how often the judge passes with them.
     power : float, optional
         How often it should pass, where items are asked for.
     rng : numpy.random.Generator or int, optional
@@ -101,7 +101,7 @@ def judge_plan(
     Notes
     -----
     Every human grades every item, the errors of all are independent, and the test is
-    that of `alternative_annotator_test` by default at the level .05. Where graders err
+    that of `alternative_annotator_test` by default at the level .05. If graders err
     on the same items they tie more often than here, and fewer items suffice.
 
     References
@@ -111,7 +111,7 @@ def judge_plan(
 
     Examples
     --------
-    Three experts and a judge, all of whom are right on 90 % of the items:
+    Three experts and a judge are each right on 90 % of the items:
 
     >>> plan = judge_plan(epsilon=0.2, n_humans=3, human_accuracy=0.9, rng=1)
     >>> plan.n_items, round(plan.power, 1)
@@ -159,7 +159,7 @@ def judge_plan(
 def _plan(
     n: int, epsilon: float, accuracies: Floats, n_categories: int, seed: int
 ) -> JudgePlan:
-    """Simulate studies of so many items."""
+    """Simulate studies of n items."""
     m, rng = len(accuracies) - 1, np.random.default_rng([seed, n])
     b, c = _drawn(n, accuracies, n_categories, rng)
     # it passes where k ≥ m/2 p-values are at most the k-th threshold, for some k

@@ -86,7 +86,7 @@ def position_bias(
         One row a verdict of one judge: what was asked, the model whose answer was shown
         first, the other, and which of the two won; a frame has columns of these names.
     tie : str, optional
-        What stands for the winner in a tie.
+        Word for a tie in the column of winners.
     level : float, optional
         Nominal level.
 
@@ -240,7 +240,7 @@ def bradley_terry(
     comparisons : iterable of (item, first, second, winner), or long DataFrame
         One row a verdict, as `position_bias` takes them; any order, any number.
     tie : str, optional
-        What stands for the winner in a tie, which is half a win for each.
+        Word for a tie in place of a winner; a tie is half a win for each.
     level : float, optional
         Nominal level.
 
@@ -252,7 +252,7 @@ def bradley_terry(
     Raises
     ------
     RatingsError
-        If they are not such rows, or there is none.
+        If they are not such rows, or there are no rows.
     ParameterError
         If the level is invalid.
 

@@ -260,10 +260,10 @@ def prediction_powered_mean(
     -----
     Of labels and predictions that are all 0 or 1 the automatic interval adds z²
     labelled items in which both, neither and either is 1, a quarter each, to the
-    variance and to λ, as Agresti and Coull do for a share, and takes t in the place of
-    z. Without them an interval has no width where the judge is never wrong in the few
-    labelled items. It is cut to [0, 1]. Of other numbers it leaves out one labelled
-    item at a time, λ estimated anew, with t.
+    variance and to λ, as Agresti and Coull do for a share, and uses t instead of z.
+    Without them an interval has no width if the judge is never wrong in the few
+    labelled items. It is cut to [0, 1]. For other numbers it leaves out one labelled
+    item at a time, estimates λ again each time, and uses t.
 
     References
     ----------
@@ -579,7 +579,7 @@ class _Moments:
         return power * (self.pool - self.f) + self.y, power
 
     def ends(self, power: _Number, quantile: _Number) -> tuple[_Number, _Number]:
-        """Return the mean less and plus so many standard errors."""
+        """Return the mean minus and plus a multiple of its standard error."""
         value, _ = self.mean(power)
         # var(Y - λF)/n + var(λF of the others)/N
         squares = self.yy - 2.0 * power * self.yf + power**2 * self.ff
@@ -629,7 +629,7 @@ class _Moments:
 def _share_moments(
     n: _Number, m: _Number, y: _Number, f: _Number, both: _Number, pool: _Number
 ) -> _Moments:
-    """Return the means of zeros and ones, of which both are 1 in a share of items."""
+    """Return the moments of zeros and ones that are both 1 in a share of items."""
     return _Moments(
         n=n, m=m, y=y, f=f, yy=y, yf=both, ff=f, pool=pool, pool_squared=pool
     )

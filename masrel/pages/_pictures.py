@@ -91,12 +91,12 @@ class PartSeen:
 
     @property
     def has_few_grades(self) -> bool:
-        """Whether each grade has room in a picture, and is no measurement."""
+        """Whether each grade has room in a picture, and is not a measurement."""
         return 2 <= len(self.file.scale.grades) <= _MOST_GRADES and not self.is_measured
 
     @property
     def has_intervals(self) -> bool:
-        """Whether items by themselves are what was sampled."""
+        """Whether independent items are what was sampled."""
         return self.questions.target is not None and not self.part.clusters
 
     @property
@@ -177,7 +177,7 @@ class PartSeen:
         self, name: str, builder: str, arguments: tuple[object, ...], caption: str,
         alt: str = "",
     ) -> Drawing:  # fmt: skip
-        """Return a drawing that says of which part it is."""
+        """Return a drawing that names its part."""
         of_part = f"{self.group}: " if self.group else ""
         return Drawing(
             name=name,

@@ -94,7 +94,7 @@ def drawn_block(
     stamp: str = "",
     forms: Sequence[Form] = ("inline",),
 ) -> Block:
-    """Return a block, its figure drawn; a stamp stands for one that has none."""
+    """Return a block, its figure drawn; a stamp is given to one that has none."""
     pictures: dict[Form, bytes] = {}
     if isinstance(content, Drawing):
         from masrel.plots import draw  # a page without pictures loads nothing of it

@@ -260,7 +260,8 @@ def units_needed(
     Returns
     -------
     int
-        The least n for which t(n − 1) · `standard_error` · √(`n_units`/n) is no larger.
+        The least n for which t(n − 1) · `standard_error` · √(`n_units`/n) is at most
+        `half_width`.
 
     Raises
     ------

@@ -167,8 +167,8 @@ def plan_grid(
     study : Study
         What all of them share. Its method is "auto".
     n_items, n_raters : int or sequence of int, optional
-        Sizes; those of `study` when not given. Where one is None it is solved for in
-        every cell.
+        Sizes; those of `study` when not given. One that is None is solved for in every
+        cell.
     value : float or sequence of float, optional
         True coefficients.
     prevalences : sequence of float, or several of them, optional
@@ -185,8 +185,8 @@ def plan_grid(
     -------
     tuple of Plan
         One for each value, prevalences, number of items and number of raters, the last
-        of them varying first. Where a size is solved for and none reaches the aim, the
-        best that can be had, whose `reaches_aim` is False.
+        of them varying first. If a size is solved for and none reaches the aim, the
+        best plan, whose `reaches_aim` is False.
 
     Raises
     ------

@@ -252,7 +252,7 @@ def _moments(design: Design, outcomes: Floats, weight: Floats) -> Floats:
 
 
 def numbers_of(moments: Floats) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the means over studies that there are, and their Monte Carlo errors."""
+    """Return the means over studies, and their Monte Carlo errors."""
     n, sums, squares = moments
     with np.errstate(invalid="ignore"):
         mean = sums / n

@@ -41,8 +41,8 @@ class LatentModel:
     rater_sd : float
         Standard deviation of the raters' biases.
     positions : tuple of float
-        The traits of the items where every study has the same items; empty where they
-        are drawn anew.
+        The traits of the items if every study has the same items; empty if each study
+        draws new ones.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class Study:
         Its name in the register; any that is a function of sums over items, and the
         intraclass correlations icc_1, icc_c1 and icc_a1.
     target : {"items", "raters", "both"}
-        What a new study would draw anew.
+        Population that the interval is about: other items, other raters, or both.
     value : float or None
         The coefficient that is taken to be true; None where the model has it: a table,
         or a `LatentModel`.
@@ -380,7 +380,7 @@ class Plan:
 
 
 def limits_of(study: Study) -> tuple[float, float]:
-    """Return the limits of the interval, infinite where there is none."""
+    """Return the limits of the interval, infinite where it has none."""
     return (
         -math.inf if study.lower is None else study.lower,
         math.inf if study.upper is None else study.upper,
@@ -520,7 +520,7 @@ def pilot(
     ratings : array_like or DataFrame, shape (n_items, n_raters)
         The pilot's ratings, as the coefficient takes them.
     target : {"items", "raters", "both"}
-        What a new study would draw anew.
+        Population that the interval is about: other items, other raters, or both.
     weights : str or Weights, optional
         Weights of the coefficient.
     categories : sequence of str, int or float, optional
@@ -536,7 +536,7 @@ def pilot(
     Raises
     ------
     RatingsError
-        If the ratings are no table of them, or the coefficient is undefined in them.
+        If they are not a table of ratings, or the coefficient is undefined in them.
     ParameterError
         If an option does not fit the coefficient.
 

@@ -413,7 +413,7 @@ class Design:
 
     @cached_property
     def problem(self) -> IntervalProblem:
-        """The question about the ratings, of which each study has others."""
+        """The question about the ratings, which differ from study to study."""
         per_rater = 2 if self.entry.shape == "pairs" else 1
         n_columns = max(self.n_raters, 2 // per_rater) * per_rater
         codes = np.repeat(np.arange(len(self.model.scale))[:, None], n_columns, axis=1)

@@ -104,7 +104,7 @@ def forest(
     Parameters
     ----------
     estimates : Estimate or sequence of Estimate
-        What is drawn, first on top; an undefined one is said to be.
+        What is drawn, first on top; an undefined one is marked as such.
     labels : sequence of str, optional
         What each is called; the title of its coefficient unless given.
     groups : sequence of str, optional

@@ -1,7 +1,7 @@
 """Differences of raters against their mean, with the limits of agreement.
 
-Items at one place are one dot, the larger the more there are. Where there are too many
-places for dots the plane is in hexagons, the darker the more items are in each.
+Items at one place are one dot, the larger the more there are. If there are too many
+places for dots, the plane is in hexagons, the darker the more items are in each.
 """
 
 import math

@@ -55,7 +55,7 @@ def components(
 
     Bars are shares of the three together, from 0 to 1 whatever the data; beside each
     is its standard deviation in the unit of the ratings. The share of items is
-    ICC(A,1), unless mean squares estimate a variance as less than 0, which is said.
+    ICC(A,1), unless mean squares estimate a variance as less than 0; a note says so.
 
     Parameters
     ----------
@@ -166,17 +166,17 @@ def letters_on(colour: Sequence[float] | NDArray[np.float64]) -> str:
 
 
 def inches_of(text: str) -> float:
-    """Return how long a text is, in letters of 9 points, some of which are wide."""
+    """Return the length of a text in letters of 9 points; some letters are wide."""
     return 0.075 * sum(1 + (east_asian_width(letter) in "WF") for letter in text)
 
 
 def room_of(names: Sequence[str]) -> float:
-    """Return the inches of names at the left of rows, or standing above columns."""
+    """Return the inches of names at the left of rows, or upright above columns."""
     return 0.3 + max(map(inches_of, short_names(names)))
 
 
 def name_rows(axes: Axes, names: Sequence[str], cell: float) -> None:
-    """Name rows that are so many inches high, as many as have room."""
+    """Name rows that are `cell` inches high, as many as have room."""
     every = math.ceil(LINE / cell)
     axes.set_yticks(range(0, len(names), every), short_names(names)[::every])
     axes.tick_params(axis="y", length=0)
@@ -185,7 +185,7 @@ def name_rows(axes: Axes, names: Sequence[str], cell: float) -> None:
 def name_columns(
     axes: Axes, names: Sequence[str], cell: float, places: Sequence[float]
 ) -> None:
-    """Name columns that are so many inches wide, above them, upright where narrow."""
+    """Name columns that are `cell` inches wide, above them, upright if narrow."""
     names = short_names(names)
     is_narrow = max(map(inches_of, names)) + 0.06 > cell
     every = math.ceil(LINE / cell) if is_narrow else 1
@@ -197,7 +197,7 @@ def name_columns(
 def rows_of_shares(
     axes: Axes, names: Sequence[str], texts: Sequence[str], cell: float, label: str
 ) -> None:
-    """Make axes of shares, a row a name, with a text at the right of each."""
+    """Make axes of shares, one row per name, with a text at the right of each."""
     axes.set(xlim=(0.0, 1.0), ylim=(len(names) - 0.5, -0.5), xlabel=label)
     axes.spines["left"].set_visible(False)
     name_rows(axes, names, cell)

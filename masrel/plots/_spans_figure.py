@@ -10,7 +10,7 @@ from masrel.plots._style import BLUE, ORANGE, Picture
 def spans_picture(
     spans: Sequence[tuple[str, str | None, int, int]], length: int | None, document: str
 ) -> Picture:
-    """Return spans (observer, label, begin, length) as bars, a row an observer."""
+    """Return spans (observer, label, begin, length) as bars, one row per observer."""
     # one without a label says that somebody looked
     observers = sorted({who for who, *_ in spans})
     labels = sorted({label for _, label, *_ in spans if label})

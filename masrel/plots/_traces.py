@@ -136,7 +136,7 @@ def traces_picture(
 def draw_traces(
     axes: Axes, stretches: Sequence[Stretch], quantity: Against, factor: float = 1.0
 ) -> None:
-    """Draw stretches by lines so many times as wide as usual."""
+    """Draw stretches by lines of a multiple of the usual width."""
     for code, (_, look) in enumerate(_PHASES):
         # One line for all, with a gap wherever a run of the phase ends; a dot where a
         # run begins, but for the first of a stretch.

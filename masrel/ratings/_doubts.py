@@ -74,7 +74,7 @@ _MAX_COMPARED = 2000  # columns that are compared with all others
 _ENOUGH = 3  # ratings of a column that are some grade of another's, if both rate
 _ENOUGH_ROWS, _MANY_CATEGORIES = 4, 15  # of a table that is surely one of counts
 _SHOWN = 5
-_APART = "their names or grades, none of which occurs as written in another column"
+_APART = "their names or grades, which do not occur as written in another column"
 
 
 def doubt_columns(
@@ -85,7 +85,7 @@ def doubt_columns(
     scale: Scale,
     freq: Codes,
 ) -> list[Finding]:
-    """Refuse or warn of columns of a wide table that are no raters."""
+    """Refuse or warn of columns of a wide table that are not raters."""
     # codes (n_items, n_raters): places in the scale, -1 where missing; freq (n_items,)
     names = [sheet.header[place] for place in layout.raters]
     findings = []
@@ -336,7 +336,7 @@ def _is_no_rater(sheet: Sheet, place: int, lower: set[str]) -> bool:
 
 
 def called_gold(name: str) -> bool:
-    """Return whether a name is no person's, but that of gold or a majority's vote."""
+    """Return whether a name is not a person's but that of gold or a majority vote."""
     return _is_sum(_words(name)) or bool(_words(name) & _SURE)
 
 

@@ -53,14 +53,14 @@ class Reading:
         Column of the clusters that items come in, such as patients with several
         sites: one of each item.
     frequency : str or None
-        Column that says how many items each row of a wide table stands for.
+        Column with the number of items that each row of a wide table represents.
     repeated : {"error", "first", "last", "mean", "each"}
         What becomes of a second grade of an item by the same rater; each is kept for
         limits of agreement alone, those of all sessions as repeats.
     categories : sequence of str or None
         Every grade of the scale, in order; the grades met unless given.
     missing_codes : sequence of str
-        Cells that stand for a missing grade, beside empty ones and NA.
+        Cells that mean a missing grade, besides empty ones and NA.
     decimal, thousands : str or None
         Decimal mark, and the mark between thousands; a point, and none, unless the
         grades tell. Beside a point between thousands it is a comma.
@@ -71,7 +71,7 @@ class Reading:
     delimiter, encoding, sheet : str or None
         Separator of cells (tab and blanks by name), encoding, and sheet of a workbook.
     transpose : bool
-        Whether a row is a rater and a column an item.
+        Whether each row is a rater and each column is an item.
     counts, table : bool
         Whether it is a table of counts, items by categories, or a contingency table
         of two raters, the first of them in the rows.
@@ -313,7 +313,7 @@ def quoted(names: Iterable[str]) -> str:
 
 
 def if_missing(texts: Sequence[str]) -> str:
-    """Return how texts are counted as missing, if that can be said of so many."""
+    """Return how texts are counted as missing, if there are not too many."""
     # an option separates its codes by commas
     if not 0 < len(texts) <= MOST_CODES or any("," in text for text in texts):
         return ""
@@ -460,7 +460,7 @@ _TEXTS = {
     "nothing in common": "one column has {one}, the other {other}: if these are the "
     "same grades, spell them alike; if not, add --raters {names}",
     "frequency": "column {column!r} looks like the number of items that each row "
-    "stands for: if it is, add --frequency {name}; if each row is one item, add "
+    "represents: if it is, add --frequency {name}; if each row is one item, add "
     "--ignore {name} and name the raters with --raters",
     "first column": "{where}: the first column, {column!r}, has the same grades as the "
     "others: add --no-item if it is a rater, or --item {name} if it names the items",

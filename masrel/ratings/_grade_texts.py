@@ -1,4 +1,4 @@
-"""Which grade a text is, or that there is none.
+"""Which grade a text is, or that it is missing.
 
 Every text that occurs is looked at once. Two texts are one grade only where that cannot
 be wrong, and each time it is noted; whatever else looks alike is warned of.
@@ -397,7 +397,7 @@ def _thousands_mark(
 
 
 def count_of(text: str, options: Reading) -> float:
-    """Return a number of items, -1 where a text is none, or may be of thousands."""
+    """Return a number of items, -1 if a text is not one, or may be in thousands."""
     mark = options.thousands or ""
     if mark and _grouped(mark, "").fullmatch(text):
         text = re.sub(f"[{_kinds(mark)}]", "", text)

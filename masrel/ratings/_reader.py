@@ -98,7 +98,7 @@ class RatingsPart:
     Attributes
     ----------
     group : str or None
-        What the column of groups says of them; None where there is none.
+        Their entry in the column of groups; None without such a column.
     session : str or None
         Their session; None where the file has no such column.
     items, raters : tuple of str
@@ -185,9 +185,9 @@ def read_ratings(
     Raises
     ------
     RatingsError
-        If the file is no table of ratings, or could be more than one.
+        If the file is not a table of ratings, or could be more than one.
     ParameterError
-        If `reading` has categories that are no scale.
+        If `reading` has categories that are not a scale.
 
     Examples
     --------
@@ -853,7 +853,7 @@ def read_spans(
 
     @cache
     def placed(text: str) -> tuple[int, int, float]:
-        """Return the nearest step, the next one, and how far off the nearest is."""
+        """Return the nearest step, the next one, and the distance to the nearest."""
         exact = Fraction(text) / Fraction(str(step or 1))
         return round(exact), math.ceil(exact), float(abs(exact - round(exact)))
 

@@ -188,11 +188,11 @@ class Sheet:
     line_of: Callable[[int], int]  # number of a record to the line that it is in
 
     def at(self, number: int) -> str:
-        """Return where a record, the names from 0, stands in the file."""
+        """Return the place of a record in the file, counted from the names as 0."""
         return f"{self.unit} {self.line_of(number)}"
 
     def where(self, row: int) -> str:
-        """Return where a row, from 0, stands in the file."""
+        """Return the place of a row, from 0, in the file."""
         return self.at(int(self.numbers[row]))
 
     def refuse(
@@ -553,7 +553,7 @@ def _below_comments(name: str, text: str, start: int, delimiter: str | None) -> 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row as it stands in its file."""
+    """A row as it is in its file."""
 
     line: int  # the first of its lines, from 1
     end: int  # the last

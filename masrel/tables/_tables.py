@@ -34,7 +34,7 @@ INTERIM = "INTERIM"
 
 
 def tag_of(data: str) -> str:
-    """Return what is said before anything made of simulated or interim data."""
+    """Return the label of anything made of simulated or interim data."""
     device = [SIMULATED_DEVICE] * ("simulated device" in data)
     labels = device or [SIMULATED] * ("simulated" in data)
     labels += [INTERIM] * (INTERIM.lower() in data)
@@ -85,7 +85,7 @@ class Table:
 
     @property
     def tag(self) -> str:
-        """What is said before the caption of data that are simulated or interim."""
+        """Label before the caption of data that are simulated or interim."""
         return tag_of(self.data)
 
     @property
@@ -152,7 +152,7 @@ def number(value: Value, digits: int | None, *, in_units: bool = False) -> str:
 
 
 def significant(value: float, digits: int = 6) -> str:
-    """Return a number with so many digits, whatever its size."""
+    """Return a number with this many digits, whatever its size."""
     return f"{value:.{digits}g}"
 
 

@@ -1,4 +1,4 @@
-"""What a latent-trait model implies: kappa of new raters, and ratings made anew.
+"""What a latent-trait model implies: kappa of new raters, and replicated ratings.
 
 A rater drawn from the population gives item i grade k with probability
 p_ik = E[Φ((τ_k - θ_i)/s) - Φ((τ_(k-1) - θ_i)/s)], s² = ω² + σ² e^(2 η w), where the
@@ -32,7 +32,7 @@ _CHUNK = 400  # positions at a time
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """Agreement of two raters drawn anew, at n positions."""
+    """Agreement of two new raters, at n positions."""
 
     # observed, chance: (n,): p_o and P_e
     observed: Floats = field(compare=False, repr=False)
@@ -132,7 +132,7 @@ class PredictiveCheck:
     observed : float
         In the ratings.
     low, high : float
-        Central 95 % of ratings made anew by the same raters on the same items.
+        Central 95 % of replicated ratings by the same raters on the same items.
     p_value : float
         Share of those that are larger, with half of those that are equal. Near 0 or 1
         the model does not make ratings such as these.
@@ -151,7 +151,7 @@ def predictive_checks(
     categories: Sequence[object],
     generator: np.random.Generator,
 ) -> tuple[PredictiveCheck, ...]:
-    """Compare ratings with ratings made anew from the posterior."""
+    """Compare ratings with ratings replicated from the posterior."""
     # Takes codes (n_items, n_raters)
     drawn = np.where(codes >= 0, replicate(traits, generator), -1)
     n = len(categories)
@@ -177,7 +177,7 @@ def predictive_checks(
 
 
 def replicate(traits: Traits, generator: np.random.Generator) -> NDArray[np.int64]:
-    """Let the same raters rate the same items anew."""
+    """Let the same raters rate the same items again."""
     # -> (n, n_items, n_raters)
     perceived = traits.severity[:, :, None] + traits.bias[:, None, :]
     noise = generator.standard_normal(perceived.shape)

@@ -74,7 +74,7 @@ class LatentTrait:
     Attributes
     ----------
     kappa : Estimate
-        Fleiss' kappa of two raters drawn anew: posterior median, its standard
+        Fleiss' kappa of two new raters: posterior median, its standard
         deviation as `standard_error`, and interval; `observed` and `chance` are the
         posterior medians of both agreements.
     items : tuple of Quantity
@@ -91,7 +91,7 @@ class LatentTrait:
     noise_spread : Quantity
         Standard deviation of the logarithms of raters' noises.
     grades : tuple of tuple of float
-        Per item, the probability of each grade by a rater drawn anew (posterior mean).
+        Per item, the probability of each grade by a new rater (posterior mean).
     checks : tuple of PredictiveCheck
         Whether the model makes ratings such as these.
     prior : LatentPrior

@@ -241,7 +241,7 @@ def _joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
         ((problem := kind_problem(kind)) is not None, f"--kind: {problem}"),
         (
             kind == DEFAULT_KIND,
-            f"--kind: needs a kind other than {kind}; --model names models of that kind",
+            f"--kind: needs a kind other than {kind}, for which there is --model",
         ),
     )
     values: dict[str, float] = {}

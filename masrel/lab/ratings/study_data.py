@@ -130,8 +130,8 @@ def read_study_data(
         read = f"{len(ratings.rows)} ratings from {source}"
     if ratings.is_sealed and not allows_sealed:
         raise RatingsError(
-            f"{study.schedules}: which models were met is sealed: masrel record "
-            "unblind --all opens it, once every session is over"
+            f"{study.schedules}: the models presented are sealed: masrel record "
+            "unblind --all opens them once every session is over"
         )
     return StudyData(
         paths=study,

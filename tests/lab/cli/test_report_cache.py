@@ -221,7 +221,8 @@ def test_a_report_that_was_cut_off_is_called_so_until_it_is_made_anew(
     before = contents(folder)
     (folder / "unfinished.json").write_bytes((folder / "manifest.json").read_bytes())
     (folder / "manifest.json").unlink()
-    said = f"{folder}: is incomplete because writing was interrupted; masrel report writes it again\n"
+    why = "is incomplete because writing was interrupted; masrel report writes it again"
+    said = f"{folder}: {why}\n"
     export = ("export", study, "--as", "bids", "-o", study / "out")
     for call in (("verify", study), export, ("report", study, "--check")):
         assert said in masrel(*call).err

@@ -124,7 +124,8 @@ CASES = {
         ("SIMULATED DEVICE: persons gave these grades, 3 of 3 on the simulated device",
          "1 rater received the models in a random order, drawn beforehand, and saw "
          "only their codes", "raters stretched the arm 1.0 times", "In session test, 1 "
-         "of 2 raters completed all 3 presentations", "stamp='SIMULATED DEVICE, INTERIM')"),
+         "of 2 raters completed all 3 presentations",
+         "stamp='SIMULATED DEVICE, INTERIM')"),
         never=("a program", "SIMULATED DATA"), of="drawn", then=by_a_person,
     ),
     "a person and a program": Case(

@@ -104,7 +104,7 @@ def test_no_file_names_what_was_met_and_what_is_given_is_the_same(
     assert verify_study(study).is_whole
     ratings = ratings_from_logs(study, protocol)
     assert {row.model for row in ratings.rows} == {"(sealed)"}
-    with pytest.raises(RatingsError, match="is sealed: masrel record unblind --all"):
+    with pytest.raises(RatingsError, match="are sealed: masrel record unblind --all"):
         read_study_data(study, protocol)
     assert unseal_study(study, protocol, **BY) == 2
     assert not is_sealed(study, protocol)
