@@ -494,10 +494,10 @@ def lin_ccc(
     Notes
     -----
     For two raters 2 s_xy / (s_x² + s_y² + (x̄ - ȳ)²), with moments over n; the error is
-    that of [1]_ with the erratum, over n - 2. For more raters the overall coefficient of
-    [2]_, in which numerators and denominators of all pairs are added up; the error is
-    then the delta method's, and the interval a jackknife of items with t. Items with a
-    missing rating are left out.
+    that of [1]_ with the erratum, over n - 2. For more raters: the overall coefficient
+    of [2]_, in which numerators and denominators of all pairs are added up; the error
+    is then the delta method's, and the interval a jackknife of items with t. Items with
+    a missing rating are left out.
 
     References
     ----------

@@ -134,8 +134,8 @@ def estimate(
     method : {"auto", "analytic", "jackknife", "bootstrap", "posterior"}, optional
         Kind of interval; "auto" chooses by target and size. Each rule has a name, such
         as "auto-2026.1", with which it can be used after a newer one exists: the
-        interval's `method` names it, and a note says what was chosen and why. The functions
-        of the same names have more options.
+        interval's `method` names it, and a note says what was chosen and why. The
+        functions of the same names have more options.
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional

@@ -81,7 +81,7 @@ _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 
 
 def read_regular(path: Path, *, most: int, follows: bool = True) -> bytes:
-    """Return the bytes of a regular file of at most so many, or of a link to one."""
+    """Return the bytes of a regular file, or of a link to one; at most `most`."""
     # A pipe without a writer would keep it waiting, and a device never ends.
     if follows:
         descriptor = regular(os.open(path, os.O_RDONLY | _NO_WAIT | BINARY), path)
@@ -173,7 +173,7 @@ YES_NO = ("no", "yes")
 
 
 def is_unknown(value: object) -> bool:
-    """Return whether a table has nothing in its place."""
+    """Return whether a table has no value here."""
     return value is None or (isinstance(value, float) and math.isnan(value))
 
 
@@ -361,7 +361,7 @@ def read_once() -> Iterator[None]:
 def as_then(
     n_lines: Mapping[str, int], answer: Callable[[_About], _Answer], about: _About
 ) -> _Answer:
-    """Return what a function says while logs say no more than in so many lines."""
+    """Return what a function says while logs end at these numbers of lines."""
     context = copy_context()
     context.run(_then.set, n_lines)
     return context.run(answer, about)

@@ -297,7 +297,7 @@ _GUIDELINES: dict[str, tuple[str, str, tuple[_Item, ...]]] = {
 def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Checklist:
     """Fill the checklist of a reporting guideline from the record of a study.
 
-    Before there are ratings what is known of the plan is said. A damaged record is
+    Before there are ratings, it states what is known of the plan. A damaged record is
     refused.
     """
     if guideline not in _GUIDELINES:

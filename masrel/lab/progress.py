@@ -131,7 +131,7 @@ def session_progress(
     -------
     tuple of SessionProgress
         Sessions and raters in the protocol's order; in the copy of a site, those of its
-        raters. Of a log that is damaged the stage is ``"unreadable"``.
+        raters. If a log is damaged, the stage is ``"unreadable"``.
 
     Raises
     ------
@@ -434,9 +434,9 @@ def next_step(
     Returns
     -------
     NextStep
-        A command that would not be refused: what is damaged first, then a change of the
-        plan that nobody has recorded, then what has begun, then what has not, and what
-        is made of complete sessions.
+        A command that would not be refused: first for what is damaged, then for an
+        unrecorded change of the plan, then for sessions that have begun, then for those
+        that have not, and last for what is made of complete sessions.
     """
     open_ = open_sessions(sessions, raters)
     ready = [session for session in open_ if session.due.not_today is None]

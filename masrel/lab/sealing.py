@@ -37,7 +37,7 @@ def is_sealed(study: StudyPaths, protocol: Protocol) -> bool:
     Returns
     -------
     bool
-        Whether there is one; one that is damaged is none.
+        Whether there is one; one that is damaged does not count.
     """
     drawn = _read_drawn(study, protocol.rater_sessions, skips_damaged=True)
     return any(schedule.is_closed for _, schedule in drawn)

@@ -82,7 +82,7 @@ def analyze(
         ratings.
     changes : sequence of PlanChange, optional
         What has changed in the plan since it was drawn
-        (`masrel.lab.conduct.plan_changes`), which is said beside the numbers.
+        (`masrel.lab.conduct.plan_changes`), which is shown with the numbers.
 
     Returns
     -------

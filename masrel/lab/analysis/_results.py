@@ -167,7 +167,7 @@ class InPersonAgreement:
     Attributes
     ----------
     session : str or None
-        The session of the haptic grades; None when there is none.
+        The session of the haptic grades; None without one.
     pairs : tuple of InPersonPair
         Every pair of grades.
     n_pairs, n_equal : int
@@ -273,7 +273,7 @@ class Presentations:
     n_felt, n_below_threshold, n_no_catch, n_unknown : int
         Presentations in which what the model has was felt; in which no stretch reached
         ν_th; in which no catch came though the model has one at that speed; and those
-        of which nobody knows.
+        for which it is unknown.
     n_grip_lost : int or None
         Presentations in which the arm came loose and the model let it go; None where
         no log says so of any.

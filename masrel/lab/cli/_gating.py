@@ -68,7 +68,7 @@ def gate_options() -> Decorator:
 
 
 def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> dict[str, Any]:
-    """Compare an analysis with gates; return what is said and written of it."""
+    """Compare an analysis with gates; return what is printed and written."""
     from masrel.lab.analysis import check_gates
 
     results = check_gates(analysis, gates)

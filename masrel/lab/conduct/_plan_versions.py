@@ -91,8 +91,8 @@ def plan_changes(study: StudyPaths, protocol: Protocol) -> tuple[PlanChange, ...
     Returns
     -------
     tuple of PlanChange
-        In order of time, those that nobody has recorded last. Empty where nothing has
-        been drawn, or was drawn before draws left a copy of their protocol.
+        In chronological order, unrecorded ones last. Empty if nothing has been drawn,
+        or if it was drawn before draws kept a copy of their protocol.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def _content(protocol: Protocol, texts_sha256: str) -> dict[str, Any]:
 def plan_versions(study: StudyPaths) -> list[tuple[Protocol, Event]]:
     """Return each protocol that was kept, that of the first draw first, with the event.
 
-    A copy that has not its hash, or is no protocol, is refused.
+    A copy that does not match its hash, or is not a protocol, is refused.
     """
     return [
         (_copy_of(log, event), event)
@@ -227,7 +227,7 @@ def registration(study: StudyPaths, protocol: Protocol) -> dict[str, object]:
     Parameters
     ----------
     study : StudyPaths
-        Where the study is; its secret is drawn if there is none yet.
+        Where the study is; its secret is drawn if it has none yet.
     protocol : Protocol
         The study's protocol.
 

@@ -119,9 +119,9 @@ def record_note(
     Raises
     ------
     ParameterError
-        If a text is blank, one of the choices is none, a day is none or to come, the
-        protocol has no such rater or session, or something of an adverse event is said
-        of anything else.
+        If a text is blank, a choice is unknown, a date is invalid or in the future, the
+        protocol has no such rater or session, or a field of adverse events is given for
+        anything else.
     SessionLogError
         If the log of the study's conduct is damaged.
     OSError
@@ -162,7 +162,7 @@ def rater_values(
     -------
     dict of str to dict
         By rater and field, every one of them: text (a date too), a number, or None
-        where nothing is known. What was recorded last goes before the protocol.
+        where nothing is known. What was recorded last overrides the protocol.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def record_rater_values(
     rater : str
         Of whom.
     values : mapping of str to str
-        Field to value, as text; an empty text stands for nothing known.
+        Field to value, as text; an empty text means unknown.
     who : str
         Who says so.
     now : callable, optional

@@ -116,13 +116,14 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
     Returns
     -------
     tuple of Event
-        In order of time, with the fields that ``docs/reference/formats/conduct_log.md``
-        lists; None stands for all, or for nothing. Empty when nothing happened.
+        In chronological order, with the fields that
+        ``docs/reference/formats/conduct_log.md`` lists; None means all, or nothing.
+        Empty if nothing happened.
 
     Raises
     ------
     SessionLogError
-        If a log is damaged or holds what is no such event.
+        If a log is damaged or holds something that is not such an event.
     """
     return tuple(e for _, e in events_of_logs(study) if e.kind in _SHOWN)
 
@@ -193,13 +194,13 @@ def stated(**texts: str) -> dict[str, str]:
 
 
 def check_choice(name: str, value: str, choices: Iterable[str]) -> None:
-    """Refuse what is none of the choices."""
+    """Refuse a value that is not one of the choices."""
     if value not in (known := tuple(choices)):
         raise ParameterError(f"{name}: needed one of {listed(known)}, got {value!r}")
 
 
 def past_day(name: str, text: str, now: Callable[[], datetime]) -> str:
-    """Return a day, as ISO 8601 has it; refuse what is none, or is to come."""
+    """Return a date in ISO 8601; refuse an invalid or a future one."""
     today = now().astimezone().date()
     try:
         day = date.fromisoformat(text)
@@ -273,11 +274,11 @@ def allot_schedules(
     study : StudyPaths
         Where the study is.
     protocol : Protocol
-        The study's protocol. Where its scheme has no rows, nothing is logged.
+        The study's protocol. If its scheme has no rows, nothing is logged.
     site : str, optional
         Of the raters of this site alone; sites must be strata.
     redraw : bool
-        Draw stale or damaged schedules anew; a rater's row stays the same.
+        Draw stale or damaged schedules again; a rater's row stays the same.
     now : callable, optional
         Gives the time of day, aware.
 

@@ -244,8 +244,8 @@ class Stretch:
 class Timeline:
     """What happens in a motion: the state machine of Fig. 7, led from piece to piece.
 
-    `p` and `motion` may have columns in their fields, a row a scene, if the motion is a
-    single stretch. Then whatever happens does so in some rows.
+    `p` and `motion` may have columns in their fields, one row per scene, if the motion
+    is a single stretch. Then whatever happens does so in some rows.
     """
 
     def __init__(self, p: ElbowParameters, motion: Motion) -> None:

@@ -204,7 +204,7 @@ def as_toml(document: Mapping[str, object]) -> str:
     Raises
     ------
     ParameterError
-        If a value is none that TOML has here.
+        If a value has a type that is not used in these TOML files.
 
     Examples
     --------
@@ -235,8 +235,8 @@ def intermediate_models(
     Returns
     -------
     dict of str to ElbowParameters
-        ``D01``, ``D02`` and so on. Of n in a gap, the i-th is i/(n + 1) of the way,
-        every number interpolated linearly: L, H, Q and D, and what else differs.
+        ``D01``, ``D02`` and so on. With n in a gap, the i-th is i/(n + 1) of the way;
+        L, H, Q, D and all other numbers that differ are interpolated linearly.
 
     Raises
     ------

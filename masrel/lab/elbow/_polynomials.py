@@ -1,7 +1,7 @@
 """Polynomials of low degree: coefficients, constant first, numbers or columns of them.
 
-A number is a float, or a column of them with a row a scene or a row a piece; what is
-said of a polynomial holds of every row. A place that there is not is nan.
+A number is a float, or a column of them with one row per scene or per piece; what holds
+for a polynomial holds for every row. A place that does not exist is nan.
 
 Two places of an interval nearer than `TIE` of its length are one place, and Bernstein
 coefficients within `NOTHING` of the largest count as 0: floats tell no more.
@@ -125,8 +125,8 @@ def first_above(
 ) -> Number:
     """Return where a polynomial is first above a level between two places.
 
-    A place nearer to high than a tie is none. Of columns only rows `among` are looked
-    at; the others are nan.
+    A place nearer to high than a tie does not count. In columns only the rows `among`
+    are searched; the others are nan.
     """
     p = [p[0] - level, *p[1:]]
     if isinstance(among, np.ndarray):

@@ -1,8 +1,8 @@
-"""Thousands of scenes at once: one array, a column an output.
+"""Thousands of scenes at once: one array, one column per output.
 
 In: joints and motions, as objects or as columns. Out: the outputs asked for, of every
 scene. Single stretches of a kind go through together, as one joint and one motion whose
-fields are columns; every other motion goes through by itself.
+fields are columns; every other motion is computed separately.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -48,7 +48,7 @@ LOADS = ("peak_torque", "residual_torque", "work", "impulse")
 
 
 class Columns:
-    """Many joints, or many motions of one kind: a column a field.
+    """Many joints, or many motions of one kind: one column per field.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ class Columns:
     Raises
     ------
     ParameterError
-        If the lengths differ, or a row is none that the kind takes; the message says
-        which, the first being 1.
+        If the lengths differ, or a row is outside the range of its kind; the message
+        says which row, counted from 1.
 
     Examples
     --------
@@ -169,7 +169,7 @@ class SceneTable:
     values : ndarray, shape (n_scenes, n_outputs)
         SI units; ``nan`` for what a scene does not reach. Read-only.
     n_alone : int
-        How many scenes went through by themselves, because their motion is not a
+        Number of scenes that were computed separately, because their motion is not a
         single stretch, or they are the only one.
     """
 

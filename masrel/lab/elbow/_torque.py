@@ -643,7 +643,7 @@ def outline(
 def line(
     joint: JointModel, motion: Motion, *, n_points: int = 800, rate_hz: float = 1000.0
 ) -> Line:
-    """Return the exact law: of an elbow so many points, of others at a rate."""
+    """Return the exact law: `n_points` for an elbow, otherwise at a rate."""
     if isinstance(joint, ElbowParameters):
         return outline(joint, motion, n_points=n_points)
     time = np.arange(math.floor(motion.duration * rate_hz) + 1) / rate_hz

@@ -30,7 +30,7 @@ class Stepper(Protocol):
     ----------
     phase : int
         Position in `masrel.lab.recording.PHASES`: "pre-catch" while nothing has been
-        triggered, "catch" from a trigger on, "post-catch" once it has given way. A
+        triggered, "catch" after a trigger, "post-catch" once it has given way. A
         joint without triggers stays in "pre-catch".
     """
 
@@ -294,7 +294,7 @@ class ToneModel(Law):
         -------
         tuple of ToneEvent
             In order of their times. What would begin at the very end of the motion, or
-            later, is none.
+            later, does not count.
         """
         last = motion.duration - _SAME_TIME
         inside = sorted(
@@ -314,7 +314,7 @@ class ToneModel(Law):
         motion : Motion
             A movement, SI units; it may hold and return.
         times : array_like of float, shape (n,)
-            Times, s; from the end of the motion on, those of its end.
+            Times, s; after the end of the motion, the values are those at its end.
 
         Returns
         -------

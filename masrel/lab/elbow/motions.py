@@ -149,7 +149,7 @@ class Motion(ABC):
         Returns
         -------
         ndarray, shape of `time`
-            Velocities, rad/s, positive in extension. Where it jumps, the later one.
+            Velocities, rad/s, positive in extension; at a jump, the later one.
         """
         return self._at(time, 1)[1]
 
@@ -164,7 +164,7 @@ class Motion(ABC):
         Returns
         -------
         ndarray, shape of `time`
-            Accelerations, rad/s². Where it jumps, the later one.
+            Accelerations, rad/s²; at a jump, the later one.
         """
         return self._at(time, 2)[1]
 
@@ -629,7 +629,7 @@ class Joined(_Laid):
     Raises
     ------
     ParameterError
-        If there is none, or one starts elsewhere; the message says which.
+        If there are no motions, or one starts elsewhere; the message says which.
 
     Examples
     --------

@@ -359,8 +359,8 @@ def _edge(since: Number, length: float) -> Number:
 class ClaspKnife(ToneModel):
     """A stretch reflex that is let go once its own torque is large enough.
 
-    r = k·[θ - λ + μ·max(ω, 0)]+ is the reflex. Where it is first r_fire or more, at
-    t_f and beyond θ_arm, a latch closes, and from t_f + d on the reflex is scaled by
+    r = k·[θ - λ + μ·max(ω, 0)]+ is the reflex. At t_f, when it first reaches r_fire
+    beyond θ_arm, a latch closes, and from t_f + d on the reflex is scaled by
     g = g∞ + (1 - g∞)·exp(-(t - t_f - d)/T): τ = k_p·(θ - θ0) + g·r. The latch opens
     where θ < θ_arm.
 
@@ -510,7 +510,7 @@ class ClaspKnife(ToneModel):
 class Contracture(ToneModel):
     """A spring, a damper, and a spring that stiffens exponentially at the end.
 
-    τ = K·(θ - θ_r) + B·ω + A·exp(κ·(θ - θ_e)), which goes on with the slope K_max
+    τ = K·(θ - θ_r) + B·ω + A·exp(κ·(θ - θ_e)), which continues with the slope K_max
     beyond θ_cap = θ_e + ln(K_max/(A·κ))/κ.
 
     Attributes
@@ -531,8 +531,8 @@ class Contracture(ToneModel):
     rest_angle : float
         θ_r, rad: where the spring has no torque. A choice of ours, not from a source.
     range_end : float
-        End of the range of motion, rad: how far a hand is meant to go. A choice of
-        ours, not from a source.
+        End of the range of motion, rad: the angle that a hand is meant to reach. Our
+        choice, not from a source.
     speed_threshold : float
         Speed from which the arm counts as moving, rad/s; that of the spastic elbow.
 
@@ -617,7 +617,7 @@ class Dystonia(ToneModel):
     """A spring towards a posture and a damper, scaled by an activation.
 
     τ = a·(K·(θ - θ_d) + B·ω), ȧ = (a∞ - a)/T. a∞ is a0 at rest and 1 during an episode,
-    which stands for a movement or a touch elsewhere and comes at a fixed time after
+    which represents a movement or a touch elsewhere and comes at a fixed time after
     the first sample; T is T_up while the activation rises and T_down while it falls.
 
     Attributes
@@ -919,7 +919,7 @@ class ThresholdReflex(ToneModel):
 
     @classmethod
     def of_mas(cls, grade: str, *, body_mass: float = 70.0) -> Self:
-        """Return the reflex of a grade of the MAS, and of a body of so many kg."""
+        """Return the reflex of a grade of the MAS, and of a body of this mass in kg."""
         mas = grade_of(_MAS, grade, "grade")
         if not 0.0 < body_mass < math.inf:
             raise ParameterError(f"body_mass: needs more than 0, got {body_mass} kg")

@@ -350,7 +350,7 @@ class Node(ABC):
 
     @abstractmethod
     def _sort(self, frame: Frame) -> None:
-        """Take in a frame that is no error."""
+        """Take in a frame that is not an error."""
 
     def _receive_until(self, is_there: Callable[[], bool], deadline_ns: int) -> bool:
         # Whether what is waited for came in time. What waits is taken after the

@@ -1,4 +1,4 @@
-"""How often an arm may be stretched, how far a presentation is, and when it is over."""
+"""How often an arm may be stretched; the progress and the end of a presentation."""
 
 import math
 from dataclasses import dataclass

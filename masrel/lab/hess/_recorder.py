@@ -241,7 +241,7 @@ def cut_off(spool: Path) -> Presented | None:
     Raises
     ------
     RecordingError
-        If it is no such file.
+        If it is not such a file.
     """
     data = read_regular(spool, most=MAX_RECORDING + _HEADER)
     if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():

@@ -46,7 +46,7 @@ class ReplayDevice(Device):
         times = columns["time_s"][:n_readings]
         if n_readings == 0 or np.any(np.diff(times) <= 0.0) or times[0] < 0.0:
             raise DeviceError(
-                "replay: needs a recording with readings whose times grow from 0 on, "
+                "replay: needs a recording with readings whose times grow from 0, "
                 f"got {n_readings} readings"
             )
         self._clock = clock

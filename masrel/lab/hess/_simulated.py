@@ -66,7 +66,7 @@ class PlantParameters:
     Raises
     ------
     ParameterError
-        If `range_end` is no angle of an elbow, or another value is negative.
+        If `range_end` is not an angle of an elbow, or another value is negative.
     """
 
     friction: Friction = field(default_factory=Friction)

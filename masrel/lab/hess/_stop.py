@@ -1,8 +1,8 @@
 """What takes the torque back from outside the loop: emergency stop and watchdog.
 
 The emergency stop is a button that a key, a signal or anything else can press. An
-amplifier may hold its last torque for ever, so a control loop that was killed must not
-be the only one who can take it back: a watchdog is a small process that idles the
+amplifier may hold its last torque permanently, so a control loop that was killed must
+not be the only one who can take it back: a watchdog is a small process that idles the
 device when the loop falls silent.
 """
 
@@ -135,7 +135,7 @@ def stop_on_key(
 def enter_on_empty_line(
     lines: TextIO | None, enter: Callable[[], object]
 ) -> Iterator[None]:
-    """Take an empty line that comes now for Enter, where the input is no terminal."""
+    """Take an empty line that comes now for Enter if the input is not a terminal."""
     buffer = getattr(lines, "buffer", None)
     is_terminal = lines is None or lines.isatty()
     if (

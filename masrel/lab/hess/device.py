@@ -83,8 +83,8 @@ class Device(ABC):
     torque_delay : float
         How long after a command the torque follows, s, as was measured; 0 by default.
     holds_torque_when_silent : bool or None
-        Whether it goes on with its last torque when nothing is sent any more, as after
-        a cable comes off. Hardware must say; None, the default, where none moves.
+        Whether it keeps its last torque when nothing more is sent, as after a cable
+        comes off. Hardware must say; None, the default, where none moves.
     """
 
     name: ClassVar[str]

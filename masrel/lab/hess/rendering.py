@@ -33,8 +33,8 @@ _NEVER_ARRIVES = 2.0 * math.pi  # an angle beyond every range, rad
 class MotionHand(Hand):
     """A hand that moves a simulated arm along a prescribed motion, then holds it.
 
-    It trembles, as a person's hand does that holds an arm against a torque: without
-    that, an arm held for 0.5 s could not be told from an encoder that froze.
+    It trembles, as the hand of a person who resists a torque does: without that, an arm
+    held for 0.5 s could not be distinguished from an encoder that froze.
 
     Parameters
     ----------

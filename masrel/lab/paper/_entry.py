@@ -88,17 +88,17 @@ def enter_sheet(
     Raises
     ------
     RatingsError
-        If the file is no such sheet, or another rater's, a code or grade or answer on
-        it is wrong, or a presentation is twice or not on it. The message lists up to
-        20 problems, each with file and row.
+        If the file is not such a sheet, or is another rater's, a code, grade or answer
+        on it is wrong, or a presentation is missing or occurs twice. The message lists
+        up to 20 problems, each with file and row.
     ScheduleError
         If the schedule is missing, damaged, or stale.
     SessionLogError
         If the session was begun with a device, or entered before, or its log is
         damaged.
     ParameterError
-        If `who` is blank, `on` is no day or one to come, or `device` is no name or
-        simulated.
+        If `who` is blank, `on` is not a date or in the future, or `device` is not a
+        name or is simulated.
     OSError
         If the log cannot be written.
 
@@ -329,8 +329,8 @@ def compare_sheet(
     Raises
     ------
     RatingsError
-        If the file is no such sheet, as for :func:`enter_sheet`, or the very file that
-        was entered.
+        If the file is not such a sheet, as for :func:`enter_sheet`, or the very file
+        that was entered.
     ScheduleError
         If the schedule is missing, damaged, or stale.
     SessionLogError

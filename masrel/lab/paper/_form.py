@@ -27,7 +27,7 @@ FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 """Columns of every sheet that is typed in; those of questions follow."""
 
 AFTERWARDS: tuple[When, ...] = ("session", "study")
-"""What stands for a position in the rows of what is asked about these."""
+"""What replaces a position in the rows of questions about these."""
 
 Position = int | When
 """The position of a presentation, or what else a row is about."""
@@ -141,7 +141,7 @@ class TypedSheet:
 
 
 def read_typed(path: Path) -> TypedSheet:
-    """Return what was typed into a sheet; RatingsError if it is no such file."""
+    """Return what was typed into a sheet; RatingsError if it is not such a file."""
     try:
         data = read_regular(path, most=MAX_SMALL)
     except OSError as error:
@@ -397,7 +397,7 @@ def _filled_row(
 
 def _needed_grade(grades: Sequence[str], got: str) -> str:
     return (
-        f"grade: needed one of {', '.join(grades)}, or {NO_GRADE} where there is none, "
+        f"grade: needed one of {', '.join(grades)}, or {NO_GRADE} if there is none, "
         f"got {repr(shortened(got)) if got else 'an empty cell'}"
     )
 

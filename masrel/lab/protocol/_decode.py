@@ -21,7 +21,7 @@ def type_problems(
 ) -> Iterator[str]:
     """Yield each key of a table that a struct cannot take, as ``key: needed ...``.
 
-    A dataclass may say more when it is made, which is said of the whole table.
+    A dataclass may raise more when it is made, which is reported for the whole table.
     """
     fields, reason = _fields(struct), None
     try:

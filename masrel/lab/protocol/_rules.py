@@ -62,7 +62,7 @@ def broken_rules(protocol: Protocol) -> Iterator[str]:
 
 
 def _broken(*rules: tuple[object, str]) -> Iterator[str]:
-    """Yield what is said of those rules that are broken."""
+    """Yield the messages of the rules that are broken."""
     return (sentence for is_broken, sentence in rules if is_broken)
 
 

@@ -22,7 +22,7 @@ _LONGEST = 10_000  # letters of an answer
 _SURROGATE = re.compile("[\ud800-\udfff]")
 
 Answer = str | int | float | None
-"""What can stand in a log as an answer; None for none."""
+"""What a log can hold as an answer; None for no answer."""
 
 
 def questions_of(
@@ -40,7 +40,7 @@ def questions_of(
 def checked_answer(question: Question, answer: Answer, *, where: str) -> Answer:
     """Return an answer as the log has it, also of a text; refuse any other.
 
-    `where` begins the message: what is answered, of which file.
+    `where` begins the message: the question and its file.
     """
     if isinstance(answer, str):
         answer = answer.strip()
@@ -77,7 +77,7 @@ FieldValue = str | int | float
 """What a field holds; a date is text, ``YYYY-MM-DD``."""
 
 RESERVED = ("rater", "site", "status", "late")
-"""Columns of ``raters.csv`` that are no fields."""
+"""Columns of ``raters.csv`` that are not fields."""
 
 _LARGEST = 2**63  # whole numbers that the hash of a protocol can hold
 

@@ -99,8 +99,8 @@ def report_sections(protocol: Protocol) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Those that ``report.sections`` names. Where it names none, all that the study
-        has something for, in the order of a paper; grades given in person, and
+        Those that ``report.sections`` names. By default, all that the study has
+        something for, in the order of a paper; grades given in person, and
         claims of a paper, are shown only where they are named.
     """
     if protocol.report.sections is not None:
@@ -274,7 +274,7 @@ def protocol_hash(protocol: Protocol) -> str:
     -------
     str
         SHA-256, 64 hexadecimal digits. Comments, order of keys and layout of the
-        file do not enter. Of a model file its numbers enter, its name, and whether
+        file do not enter. From a model file its numbers enter, its name, and whether
         it comes from simulated recordings.
     """
     return hashlib.sha256(_protocol_content(protocol)).hexdigest()
@@ -439,7 +439,7 @@ def parse_gate(
     Raises
     ------
     ParameterError
-        If it is not such a text, or the estimate, the number or the limit is none.
+        If it is not such a text, or the estimate, the number or the limit is invalid.
 
     Examples
     --------

@@ -230,7 +230,7 @@ class Question(_Table, frozen=True, kw_only=True):
 
     @property
     def range(self) -> tuple[int, int] | None:
-        """The least and the largest answer; None where answers are no numbers."""
+        """The least and the largest answer; None if answers are not numbers."""
         if self.type == "visual-analogue":
             return _ANALOGUE_RANGE
         if self.low is None or self.high is None:

@@ -103,7 +103,7 @@ def _read_toml(path: Path) -> dict[str, object]:
 
 
 def _resolve_model_files(raw: dict[str, object], folder: Path) -> Iterator[str]:
-    """Put the numbers of model files in their places; yield what is wrong."""
+    """Put in the numbers of model files; yield what is wrong."""
     models = raw.get("models")
     if not isinstance(models, list):
         return
@@ -182,7 +182,7 @@ def read_model_file(path: Path) -> ElbowParameters:
     Raises
     ------
     ProtocolError
-        If there is no such file, it is no model file, or any key is wrong.
+        If there is no such file, it is not a model file, or any key is wrong.
     """
     read = _read_tables(path)
     if isinstance(read, str):
@@ -226,7 +226,7 @@ def _read_tables(path: Path) -> dict[str, Any] | str:
 
 
 def _spell_out_scale(raw: dict[str, object]) -> Iterator[str]:
-    """Put the table of a scale in the place of its name; yield what is wrong.
+    """Replace the name of a scale by its table; yield what is wrong.
 
     The angles that belong to a scale are asked for in a questionnaire of its name.
     """

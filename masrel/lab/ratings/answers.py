@@ -76,8 +76,7 @@ def answers_from_logs(study: StudyPaths, protocol: Protocol) -> tuple[GivenAnswe
     -------
     tuple of GivenAnswer
         Of every session that has begun one for each question, None where there is no
-        answer yet; then those about the study. Corrections are in the place of what
-        they correct.
+        answer yet; then those about the study. Corrections replace what they correct.
 
     Raises
     ------

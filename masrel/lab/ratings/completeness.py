@@ -122,7 +122,7 @@ def study_remarks(
         Whether to say what happened beside the sessions, and what has changed in the
         plan, too.
     include : collection of str, optional
-        What is said though it is private: ``"who"`` recorded each, and ``"notes"``, the
+        Private content to include: ``"who"`` recorded each, and ``"notes"``, the
         reasons.
 
     Returns
@@ -130,8 +130,8 @@ def study_remarks(
     tuple of str
         A sentence each for raters who were withdrawn or are excluded, codes that were
         unblinded, logs of no rater of the protocol, days that were corrected, skipped
-        presentations, sessions that were begun anew, empty logs, recordings without a
-        log, and ratings that are not from the logs that there are. Empty when there is
+        presentations, sessions that were started again, empty logs, recordings without
+        a log, and ratings that are not from the existing logs. Empty if there is
         nothing to say.
 
     Raises

@@ -158,7 +158,7 @@ def in_person_of(study: StudyPaths, ratings: Ratings) -> InPerson | None:
     Returns
     -------
     InPerson or None
-        None where there are none, and for simulated ratings.
+        None without such grades, and for simulated ratings.
 
     Raises
     ------
@@ -295,9 +295,9 @@ def ratings_from_logs(
     -------
     Ratings
         Sessions and raters in the protocol's order, models in the schedule's. A
-        session that has begun has a row for every presentation, without grade
-        where there is none yet; one that has no log has none. Corrections are in
-        the place of the grades they correct; stretches are those of the last
+        session that has begun has a row for every presentation, without a grade if
+        it is not graded yet; one that has no log has no rows. Corrections replace
+        the grades they correct; stretches are those of the last
         presentation before the grade, and the speed is the mean of theirs.
 
     Raises

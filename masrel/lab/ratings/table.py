@@ -199,7 +199,7 @@ class Ratings:
 
     @property
     def table(self) -> "pd.DataFrame":
-        """The ratings as a data frame, made anew: a row each, columns of `Rating`."""
+        """The ratings as a new data frame: one row each, columns of `Rating`."""
         import pandas as pd  # which takes longer to load than a study to read
 
         columns = list(zip(*self.rows, strict=True)) or [()] * len(RATING_COLUMNS)
@@ -409,7 +409,7 @@ class RetestPairs:
     pairs : list, shape (n_raters, n_items, 2)
         First and second grade; None is missing.
     n_missing : int
-        Pairs of which a side is missing.
+        Number of pairs with a side missing.
     """
 
     raters: tuple[str, ...]
@@ -494,7 +494,7 @@ def retest_pairs(
     Returns
     -------
     RetestPairs
-        Raters of both sessions, as they come in the first; none is no error.
+        Raters of both sessions, in the order of the first; there may be none.
 
     Raises
     ------
@@ -551,7 +551,7 @@ def _items(
 def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -> None:
     """Write a table of ratings; the same table gives the same bytes.
 
-    One that has codes says which models they stand for: it is its owner's alone.
+    A table with codes shows which models they mean, so only its owner may read it.
 
     Parameters
     ----------

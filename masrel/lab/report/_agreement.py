@@ -184,7 +184,7 @@ def _say() -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Row:
-    """One row of a table or a forest: an estimate, or why there is none."""
+    """One row of a table or a forest: an estimate, or why it is absent."""
 
     line: EstimatePlan
     title: str  # of the line

@@ -177,8 +177,8 @@ def write_report(
 ) -> ReportFiles:
     """Write the report a protocol asks for.
 
-    It begins with what the study came to, in sentences. Of the sections only those are
-    made that `masrel.lab.protocol.report_sections` names: what is in the main part,
+    It begins with the results of the study, in sentences. Only those sections are made
+    that `masrel.lab.protocol.report_sections` names: what is in the main part,
     then the supplement; matplotlib is loaded when a section has a figure.
 
     Parameters
@@ -194,13 +194,13 @@ def write_report(
     in_person : InPerson, optional
         Grades given in person, whose notes are shown below their table.
     recordings : Path, optional
-        The folder of the sessions' recordings, of which measured torque is drawn.
+        The folder of the sessions' recordings, for figures of measured torque.
     conduct : StudyConduct, optional
         How the study was run (`study_conduct`); where there is anything to say, it is
         said after the design.
     anchors : sequence of Anchor, optional
         Hashes of the session logs (`masrel.lab.verification.anchors_of`), printed at
-        the end: a report kept elsewhere shows whether the logs were written anew.
+        the end: a report kept elsewhere shows whether the logs were rewritten.
     progress : callable, optional
         Called with the name of each figure, and of the pages, once it is made.
     raw_csv : bool, optional

@@ -353,9 +353,8 @@ def confusion_section(material: Material) -> Iterator[Content]:
     counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
     framed = np.array([[grade == aim for grade in grades] for aim in intended])
     yield Paragraph(
-        text=f"Models with an intended grade received "
-        f"{counted(int(counts.sum()), 'grade')}, of which {counts[framed].sum()} are "
-        "as intended."
+        text=f"{counts[framed].sum()} of {counted(int(counts.sum()), 'grade')} of "
+        "models with an intended grade are as intended."
     )
     texts = [
         f"intended {aim}: "

@@ -226,9 +226,9 @@ _FEW = 10  # units, below which it is wide for want of more of them
 def few(ends: Sequence[float], **counts: int) -> str:
     """Return that units are too few for an interval; nothing if it is to be shown.
 
-    It tells nothing where it covers nearly all from 0, no agreement or that of chance,
-    to 1. Of ten or more units it does that only where grades hardly differ: then they
-    are not too few, and the interval is shown, wide as it is.
+    It shows nothing if it covers nearly all from 0, no agreement or that of chance, to
+    1. With ten or more units this happens only if grades hardly differ: then they are
+    not too few, and the interval is shown, wide as it is.
     """
     is_wide = min(ends[1], 1.0) - max(ends[0], 0.0) >= _WIDE
     small = [counted(n, unit) for unit, n in counts.items() if n < _FEW and is_wide]

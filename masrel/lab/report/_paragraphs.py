@@ -1,7 +1,7 @@
 """The first paragraph of a report, and the methods to paste into a paper.
 
-Every number is one of the analysis, and what is said to have been done is what
-schedules and logs show; the words are those of ``paragraphs.txt``.
+Every number is one of the analysis, and what was done is stated as schedules and logs
+show it; the words are those of ``paragraphs.txt``.
 """
 
 import math

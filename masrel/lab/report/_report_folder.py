@@ -1,9 +1,9 @@
 """The folder of a report: whole while it has a manifest, and made when not current.
 
-The manifest names every file with its hash. It goes before the first file is replaced
-and comes after the last: a report without it was cut off. Meanwhile a list of all that
-the reports before and the new one name stands in its place, so that the next build
-knows what to remove. What else is in the folder stays.
+The manifest names every file with its hash. It is removed before the first file is
+replaced and written after the last: a report without it is incomplete. Meanwhile a list
+of all files that the earlier reports and the new one name replaces it, so that the next
+build knows what to remove. What else is in the folder stays.
 
 A report is current if it was made by the same call, of the same files, by the same
 code: a note in a folder of the study has their hash. Nothing heavy is loaded for it.
@@ -77,7 +77,7 @@ def report_files(
 
 
 def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Put the files of a report into a folder, in the place of the one there is."""
+    """Put the files of a report into a folder, replacing the report there."""
     for name in files:
         if "/" not in name:
             refuse_record(folder / name)
@@ -177,7 +177,7 @@ def _stale_files(folder: Path, named: Collection[str]) -> Iterator[Path]:
 
 
 def file_hash(path: str) -> str | None:
-    """Return the SHA-256 of a file; None where there is none that can be read."""
+    """Return the SHA-256 of a file; None if it cannot be read."""
     try:
         # a pipe without a writer keeps nobody waiting
         descriptor = regular(os.open(path, _FLAGS), Path(path))

@@ -1,6 +1,6 @@
 """Sections `speeds` and `traces`: how fast raters stretched, and what torque that made.
 
-Measured torque stands beside the torque that was sent where recordings have it.
+Measured torque is shown with the commanded torque if recordings have it.
 """
 
 import math

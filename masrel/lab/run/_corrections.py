@@ -256,8 +256,7 @@ def record_day(
 ) -> None:
     """Correct the day on which a session was held; the first one stays in its log.
 
-    The days between sessions are counted anew, those of sessions that came after it
-    too.
+    The days between sessions are counted again, also for sessions that came after it.
 
     Parameters
     ----------
@@ -277,7 +276,7 @@ def record_day(
     Raises
     ------
     ParameterError
-        If `on` is no day, or one to come, or `who` or `why` is blank.
+        If `on` is not a date, or in the future, or `who` or `why` is blank.
     SessionLogError
         If there is no such log, or it is damaged.
     OSError

@@ -27,7 +27,7 @@ one), `who` corrects it and `why`; ParameterError or SessionLogError where it ca
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GradeRequest:
-    """One request for a grade: to whom, and of which presentation.
+    """One request for a grade: the rater, and the presentation.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class GradeRequest:
     rehearsal : bool
         Whether nothing of this enters the study's ratings.
     practice : bool
-        Whether it is for practice; its grade is no rating.
+        Whether it is for practice; its grade is not a rating.
     sealed : bool
         Whether its recording is not to say which model it is of.
     rules : PresentationRules
@@ -191,7 +191,7 @@ def checked_grade(
 class GradeSource:
     """A source of grades: a person, a script, or simulated raters.
 
-    What is here is of those that nobody has to wait for; `grade` is each one's own. One
+    The methods here are for those that need no waiting; `grade` is each one's own. One
     that is listened to while a model is presented has a method ``listening``, too: it
     takes the request and the emergency stop, which it may press, and returns what lasts
     as long as the presentation. For any other the terminal is listened to.
@@ -201,7 +201,7 @@ class GradeSource:
     name : str
         Name of the source, kept in the log.
     simulated : bool
-        Whether its grades are no person's.
+        Whether its grades are not a person's.
     """
 
     name: ClassVar[str]
@@ -225,7 +225,7 @@ class GradeSource:
         """Return when a break is over; `request` comes next."""
 
     def begins_anew(self, request: GradeRequest, days: int) -> bool:  # noqa: ARG002 - as all
-        """Return whether a session begins anew that was left so many days ago."""
+        """Return whether a session that was left `days` ago starts again."""
         return False
 
     def answer(self, request: QuestionRequest) -> Answer:  # noqa: ARG002 - as all

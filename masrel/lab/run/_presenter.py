@@ -85,7 +85,7 @@ class Presenter:
         return self._grades.simulated or not moves_hardware(self._protocol.device)
 
     def provenance(self) -> dict[str, Fact]:
-        """Return what a log says of each time that it is begun or gone on with."""
+        """Return what a log says each time that it is begun or resumed."""
         return {
             "protocol_sha256": protocol_hash(self._protocol),
             "clock": self._clock,

@@ -38,7 +38,7 @@ class SimulatedGrades(GradeSource):
     between two grades, and its true grade is the upper one with a probability of
     the fraction. The rater gives the true grade with probability `accuracy`, else a
     neighbouring one. In a later session the rater gives the grade of the first one
-    with probability `retest_agreement`, else grades anew.
+    with probability `retest_agreement`, else a new grade.
 
     Parameters
     ----------

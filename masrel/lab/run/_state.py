@@ -198,7 +198,7 @@ class CodesState:
 
 @dataclass(slots=True, kw_only=True)
 class SessionState(CodesState):
-    """Where a session stands; what was before it began anew is set aside."""
+    """The state of a session; what was before it started again is set aside."""
 
     # fields of the event ``session``; empty when there is none yet
     header: "Mapping[str, Facts]" = field(default_factory=dict)

@@ -1,6 +1,6 @@
 """Run one session, from its schedule to the last grade.
 
-Started again, a session goes on where its log ends: what has a grade keeps it, and
+Started again, a session resumes where its log ends: what has a grade keeps it, and
 what was presented but not graded is presented again and logged as another attempt.
 """
 
@@ -77,9 +77,9 @@ class SessionSummary:
     simulated : bool
         Whether grades or device are simulated.
     n_set_aside : int
-        Grades that count no more, as the session began anew.
+        Grades that no longer count, because the session was started again.
     rehearsal : bool
-        Whether it was a rehearsal, of which nothing enters the study's ratings.
+        Whether it was a rehearsal, whose grades are not ratings of the study.
     log_file : Path
         Its log.
     """
@@ -143,9 +143,9 @@ def run_session(
         If the schedule is missing, damaged, foreign, or stale.
     SessionLogError
         If the log is damaged, of another schedule or protocol, was begun with
-        another device or source of grades (console and browser go on with one
-        another's), was left on another day and may not be gone on with, or is open
-        elsewhere, or if there are recordings of the session that it does not name.
+        another device or source of grades (console and browser resume one another's),
+        was left on another day and may not be resumed, or is open elsewhere, or if
+        there are recordings of the session that it does not name.
     ProtocolError
         If a model asks for more torque than the device may send, or a line of the plan
         names no coefficient.
@@ -157,7 +157,7 @@ def run_session(
         If the device cannot be used, or faults are not to be tried again.
     SessionStoppedError
         If the person stops. As after all of these but the first two, the same
-        call goes on where this one ended.
+        call resumes where this one ended.
     OSError
         If log or recording cannot be written.
 

@@ -22,7 +22,7 @@ FREE = -1
 
 @dataclass(frozen=True, slots=True)
 class LimitedRuns:
-    """Words of groups of which none has more than `longest` letters in a row."""
+    """Words of groups in which no group has more than `longest` letters in a row."""
 
     sizes: tuple[int, ...]  # letters of each group, from 1
     n_free: int  # letters of no group, of which any number may stand in a row
@@ -271,7 +271,7 @@ def _apart_word(number: int, sizes: tuple[int, ...], n_free: int) -> list[int]:
 
 
 def _pick(number: int, options: Iterable[tuple[_T, int]]) -> tuple[_T, int]:
-    """Return the option that a number falls to, each with so many, and what is left."""
+    """Return the option that a number falls to, by their counts, and the remainder."""
     for option, ways in options:
         if number < ways:
             return option, number
@@ -336,7 +336,7 @@ def subset(number: int, items: Sequence[int], size: int) -> list[int]:
 
 
 def n_arrangements(sizes: Sequence[int]) -> int:
-    """Return in how many orders things come of which each has so many copies."""
+    """Return the number of orders of things with these numbers of copies."""
     return prod(comb(sum(sizes[: i + 1]), size) for i, size in enumerate(sizes))
 
 

@@ -171,7 +171,7 @@ def copy_for_site(
     protocol : Protocol
         The study's protocol, whose sites are strata.
     study : StudyPaths
-        Where the study is; its secret is drawn if there is none yet.
+        Where the study is; its secret is drawn if it has none yet.
     site : str
         Whose copy.
     destination : Path

@@ -139,8 +139,8 @@ def draw_schedule(
     ------
     ScheduleError
         If the session is not the protocol's or does not have the rater, the secret
-        has another length, a row is missing or named where there are none, or no order
-        keeps the limits of the scheme.
+        has another length, a row is missing or named for a scheme without rows, or no
+        order keeps the limits of the scheme.
 
     Notes
     -----
@@ -304,7 +304,7 @@ _COLUMNS = ["position", "code", "model", "repeat"]
 _SHEET_COLUMNS = ["position", "code", "grade"]
 
 _SEALED = "(sealed)"  # no id of a model
-"""What stands for a model where nobody is to know which it is."""
+"""What replaces the id of a model that nobody may know."""
 
 # A code names a recording's file, so it is letters and digits only.
 _CODE = re.compile(r"[0-9A-Za-z]{1,16}")
@@ -322,7 +322,7 @@ def read_schedule(path: Path) -> Schedule:
     Returns
     -------
     Schedule
-        The schedule; :func:`masrel.lab.schedule.check_schedule` holds it against a
+        The schedule; :func:`masrel.lab.schedule.check_schedule` compares it with a
         protocol.
 
     Raises

@@ -120,7 +120,7 @@ def write_schedules(
         Where the study is; its schedules folder is made when needed. Schedules name
         the models: a new folder is readable for its owner alone.
     redraw : bool
-        Draw stale or damaged schedules anew. Schedules that still fit stay as they
+        Draw stale or damaged schedules again. Schedules that still fit stay as they
         are, byte for byte, with or without it.
     site : str, optional
         Of the raters of this site alone; sites must be strata.
@@ -230,7 +230,7 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
     tuple of str
         Each problem with its file: damaged, stale, not what its secret draws where
         the study has that secret, a sheet with other codes, or a file that belongs to
-        no rater and session. A schedule not drawn yet is none.
+        no rater and session. A schedule that is not drawn yet does not count.
     """
     try:
         secret = find_secret(study)
@@ -268,7 +268,7 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
 
 
 def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
-    """Say of which schedules the order is not concealed, or cannot be drawn again.
+    """Name the schedules whose order is not concealed or cannot be drawn again.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ Role = Literal["rater", "coordinator"]
 ROLES: tuple[Role, ...] = ("rater", "coordinator")
 
 LIFE_S = 7 * 86_400
-"""Seconds that a cookie lives; each opening of a page begins them anew."""
+"""Seconds that a cookie lives; each opening of a page restarts them."""
 
 _N_BYTES = 32
 _KEY_TEXT = re.compile(r"format: 1\nkey: ([0-9a-f]{64})\n?")
@@ -223,7 +223,7 @@ def _read_tablets(file: Path) -> dict[str, str]:
 
 
 def _find_key(file: Path, root: Path) -> bytes:
-    """Return the key that cookies are signed with; draw it where there is none."""
+    """Return the key that cookies are signed with; draw it if there is none yet."""
     if not file.is_file():
         key = secrets.token_bytes(_N_BYTES)
         text = f"format: 1\nkey: {key.hex()}\n"

@@ -42,7 +42,7 @@ from masrel.lab.serve._manager import SessionManager
 from masrel.lab.serve._role_pages import Pages
 
 Fields = Mapping[str, Any]
-"""What a page sends; texts, but for what is either so or not."""
+"""What a page sends: texts, and booleans."""
 
 JOBS = ("ratings", "report", "verify", "check", "plan")
 """Commands that a coordinator can start from the page."""
@@ -68,7 +68,7 @@ _DEVICE = (
 
 @dataclass(frozen=True, slots=True)
 class _Action:
-    """What a page and a command record: the texts it takes, and what is said of it."""
+    """What a page and a command record: the texts it takes, and its message."""
 
     record: Callable[..., object]
     needed: tuple[str, ...]

@@ -44,7 +44,7 @@ class SampleTail:
     def new_rows(self, *columns: str, every: int = 1) -> dict[str, Sequence[float]]:
         """Return what came since the last call, in the units of the loop (rad, N·m).
 
-        Of every so many rows one, and the last.
+        One of `every` rows, and the last.
         """
         first, n = self._n_read, int(self._values[0])
         rows = [*range(first, n - 1, every), *([n - 1] if n > first else [])]

@@ -77,7 +77,7 @@ class _Running:
             self.writer.write(encoded(message))
 
     def press(self, message: Message) -> None:
-        """Send what a button says; a button held down is no load for the loop."""
+        """Send what a button says; a button held down does not load the loop."""
         now = time.monotonic()
         last, when = self.pressed.get(message["kind"], (None, 0.0))
         if last is not self.message or now - when > _HELD_DOWN_S:

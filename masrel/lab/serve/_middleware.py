@@ -270,7 +270,7 @@ def _with_headers(send: Send, headers: Mapping[str, str]) -> Send:
 
 
 class _Budgets:
-    """How many requests each of so many clients may still make."""
+    """How many requests each client may still make."""
 
     def __init__(self, burst: int, per_s: float, ticks: Callable[[], float]) -> None:
         self._burst, self._per_s, self._ticks = burst, per_s, ticks

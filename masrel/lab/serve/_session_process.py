@@ -191,7 +191,7 @@ class PageGrades(GradeSource):
         self._ask(request, "break", _only("go_on"), minutes=minutes)
 
     def begins_anew(self, request: GradeRequest, days: int) -> bool:
-        """Return whether a session begins anew that was left so many days ago."""
+        """Return whether a session that was left `days` ago starts again."""
 
         def checked(message: Message) -> bool:
             return _truth(message, "anew", "the session begins again")

@@ -29,7 +29,7 @@ from masrel.lab.training._criterion import Criterion, training_criterion
 from masrel.lab.training._trainees import adaptive_weights
 
 CURVE_SETS = 4
-"""Sets of presentations of which a point is made: fewer say little, more blur."""
+"""Sets of presentations in each point: fewer say little, more blur."""
 
 STEP_SETS = 2
 """Sets from one point to the next."""
@@ -245,7 +245,7 @@ class CurvePoint:
     position : int
         Number of the last presentation.
     n_presentations : int
-        Presentations of which kappa is.
+        Number of presentations in kappa.
     n_right : int
         Of these, those with the intended grade.
     kappa : Estimate

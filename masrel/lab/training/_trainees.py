@@ -98,7 +98,7 @@ def confusion_with_kappa(
     n_grades: int,
     intended: Sequence[int],
 ) -> Floats | None:
-    """Return the confusion of a trainee with some kappa, or None if there is none."""
+    """Return the confusion of a trainee with some kappa, or None if impossible."""
     low, high = 1e-3, 1.0 if skill == "pair" else _MAX_NOISE
     ends = [kappa_of(confusion(skill, x, n_grades, intended)) for x in (low, high)]
     if not ends[1] <= kappa <= ends[0]:
@@ -141,7 +141,7 @@ def draw_training(
 def adaptive_weights(
     models: Integers, wrong: NDArray[np.bool_], n_models: int
 ) -> Floats:
-    """Return how much each presentation in adaptive order counts, 1 in the mean."""
+    """Return how much each presentation in adaptive order counts, 1 on average."""
     # models, from 0, and whether they were misgraded: both (..., n_presentations). A
     # model counts the less the likelier it was to be drawn, so that kappa is that of
     # models which are as likely as each other.

@@ -1,6 +1,6 @@
 """Train a rater: present models with known grades until the criterion is met.
 
-Started again, a training goes on where its log ends, as a session does.
+Started again, a training resumes where its log ends, as a session does.
 """
 
 import math

@@ -105,7 +105,7 @@ def checked_log(
 
 
 def time_findings(events: Sequence[Event], log: Path) -> Iterator[Finding]:
-    """Yield events whose time of day is none, or before that of the last one."""
+    """Yield events whose time is not a time, or before that of the last one."""
     before = None
     for event in events:
         where = f"line {event.line}: {event.kind}"
@@ -284,7 +284,7 @@ def read_anchors(path: Path) -> tuple[Anchor, ...]:
     Raises
     ------
     ParameterError
-        If a line is not an anchor, or there is none.
+        If a line is not an anchor, or there are no anchors.
     OSError
         If the file cannot be read.
     """

@@ -103,7 +103,7 @@ def filter_alike(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return angle, velocity, acceleration and torque after one filter.
 
-    They are of the inner samples: those with a whole window, but for the first and last
+    They are for the inner samples: those with a whole window, except the first and last
     of them. A weighted mean over a symmetric window (Hann's) commutes with d/dt:
     whatever the hand does, a linear law holds for the means as for the values, so that
     the window can be as long as an encoder's steps at a slow speed need. Noise in a
@@ -303,8 +303,8 @@ def filtered_part(samples: Samples, window: float) -> Part:
 def part_of(stretch: Stretch, which: slice, *, anew: float | None = None) -> Part:
     """Return samples of a stretch with torque as measured.
 
-    With `anew` the angle is smoothed within the part alone, by a window of so many
-    seconds, so that it knows nothing of the motion beyond.
+    With `anew`, a window in seconds, the angle is smoothed within the part alone, so
+    the motion beyond does not affect it.
     """
     samples = stretch.samples.cut(which)
     angle, velocity, acceleration = (
@@ -425,8 +425,8 @@ def slow_trial(stretch: Stretch) -> Trial:
 def fast_trial(stretch: Stretch, law: Law, instant: float | None = None) -> Trial:
     """Return a fast stretch with its catch, or a remark that says why it has none.
 
-    The catch is looked for; where a fit has it begin (`instant`) goes before if that is
-    near.
+    The catch is searched for; its beginning by a fit (`instant`) overrides the search
+    if it is near.
     """
     samples, velocity = stretch.samples, stretch.velocity
     onset = int(np.argmax(velocity >= law.constants.speed_threshold))
@@ -625,9 +625,9 @@ def find_changes(
     m·θ̈ of (5), which post-catch has and the catch has not.
 
     A catch whose rise, or an end whose climb, is below `MIN_SIGNAL` standard deviations
-    of the residuals is none; nor is an end that takes less than `MIN_GAIN` residual
-    variances off the sum of squares. If post-catch is additive, that gain alone decides
-    of an end.
+    of the residuals does not count, nor does an end that reduces the sum of squares by
+    less than `MIN_GAIN` residual variances. If post-catch is additive, that gain alone
+    decides on an end.
     """
     n = torque.size
     if n - 2 <= first + 1:

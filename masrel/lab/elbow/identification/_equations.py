@@ -362,7 +362,7 @@ def _slow(values: Floats, period: float, lag: float) -> Floats:
 def line_row(
     catch: Catch, line: float, slope: float, slowest: float
 ) -> tuple[float, float, float]:
-    """Return how far from the line of (2) a catch is, and the derivatives by L and α.
+    """Return the distance of a catch from the line of (2), and its slopes in L and α.
 
     A catch that comes late in a motion that speeds up has a larger mean speed for that
     very reason, so that a plain regression on mean speed is biased. Here the motion is

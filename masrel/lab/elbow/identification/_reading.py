@@ -83,7 +83,7 @@ class Movement:
     ------
     RecordingError
         If the columns differ in length, hold what is not finite, time does not
-        increase, or angle and torque cannot be what they are said to be.
+        increase, or angle and torque are implausible.
 
     Warns
     -----
@@ -427,9 +427,9 @@ def read_movement(
     ----------
     path : Path
         A CSV file with a line of names, separated by comma, semicolon or tab; or an
-        npz archive with one array a column. Lines that start with ``#`` before the
-        names are remarks, of which ``# simulated: true`` is understood; an archive
-        has an array ``simulated`` instead. A recording of masrel's driver is
+        npz archive with one array per column. Lines that start with ``#`` before the
+        names are remarks; only ``# simulated: true`` is understood. An archive has an
+        array ``simulated`` instead. A recording of masrel's driver is
         recognized by its columns; its torque is what the device's sensor measured, and
         without one what the joint model asked for.
     columns : mapping of str to str, optional
@@ -452,9 +452,9 @@ def read_movement(
     ParameterError
         If `columns` or `units` names what there is not.
     RecordingError
-        If the file is missing or not a recording, with row and column; if a unit
-        is not said; or if the values cannot be what they are said to be; or if
-        `of_device` and the driver recorded no measured torque.
+        If the file is missing or not a recording, with row and column; if a unit is
+        missing; if the values are implausible; or if `of_device` is True and the
+        driver recorded no measured torque.
 
     Warns
     -----

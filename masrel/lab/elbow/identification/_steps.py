@@ -280,14 +280,14 @@ class Travels(NamedTuple):
 def fit_censored(travels: Travels, *, level: float) -> tuple[FittedParameter, float]:
     """Return the mean of travels, some not seen to end, and their standard deviation.
 
-    Where the likelihood of normal travels is largest. The interval of the mean holds
-    all values whose profile likelihood is no smaller than the one that, of as many
-    values of which all are seen, the end of Student's interval has: of n values without
-    censoring, twice the profile's fall from its maximum is n·ln(1 + t²/(n - 1)), so
-    that this *is* Student's interval then. With censoring n is the number seen.
-    Simulated, of 6 to 24 values of which 7 to 75 % are censored, such intervals of 95 %
-    cover 94 to 98 %; with all values in n it would be 92 to 97 %, and with the quantile
-    of χ² 88 to 96 %. (Cohen 1959, https://doi.org/10.1080/00401706.1959.10489859)
+    The mean maximises the likelihood of normal travels. Its interval holds all values
+    whose profile likelihood is at least as large as that of the end of Student's
+    interval without censoring: for n values twice the profile's fall from its maximum
+    is then n·ln(1 + t²/(n - 1)), so this *is* Student's interval. With censoring n is
+    the number seen. In simulations with 6 to 24 values, 7 to 75 % of them censored,
+    such 95 % intervals cover 94 to 98 %; with all values in n it would be 92 to 97 %,
+    and with the quantile of χ² 88 to 96 %.
+    (Cohen 1959, https://doi.org/10.1080/00401706.1959.10489859)
 
     >>> nothing = np.empty(0)
     >>> travels = Travels(np.array([1.0, 2.0, 6.0]), nothing, nothing)

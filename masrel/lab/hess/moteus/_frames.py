@@ -64,7 +64,7 @@ def write(kind: int, first: int, *values: float) -> Subframe:
 
 
 def value_of(register: int, kind: int, raw: float) -> float:
-    """Return what a register's number on the bus stands for, in SI but for turns."""
+    """Return the value of a register's number on the bus, in SI units except turns."""
     if kind == FLOAT or register == COUNTER:
         return raw
     if raw == _MOST_NEGATIVE[kind]:

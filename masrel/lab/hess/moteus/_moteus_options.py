@@ -109,7 +109,7 @@ class MoteusOptions(BusOptions):
         What it is told to limit its torque to, N·m at the elbow; larger commands are
         refused before they are sent.
     watchdog_ms : float
-        After so long a silence it lets go by itself.
+        After this time without a message it lets go, ms.
     patience_s : float
         How long to wait for an answer, s: one period of the loop.
     estimates_torque : bool

@@ -2,7 +2,7 @@
 
 It does what the driver must cope with: it starts in its monitor, where the same
 numbers mean other things; it leaves the bus while it wakes; it does not acknowledge a
-setting; it brakes the arm when idle; and it holds its last torque for ever.
+setting; it brakes the arm when idle; and it holds its last torque permanently.
 """
 
 import math

@@ -86,7 +86,7 @@ class PropertyTable:
     ------
     ParameterError
         If one that the driver needs is missing, a number is out of range, or one
-        number stands for two properties.
+        number is given to two properties.
 
     Examples
     --------
