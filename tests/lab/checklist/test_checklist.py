@@ -113,9 +113,9 @@ def test_of_grras_seven_are_filled_four_in_part_and_four_the_authors(
     assert states["in part"] == {"2", "4", "7", "12"}
     assert states["authors"] == {"1", "3", "5", "14"}
     # days and corrections come from the logs
-    assert "from 2026-03-01 to 2026-03-10 (UTC)" in facts(checklist, "8")
+    assert "between 2026-03-01 and 2026-03-10 (UTC)" in facts(checklist, "8")
     assert "9 to 9, median 9" in facts(checklist, "8")
-    assert "1 correction of a grade" in facts(checklist, "9")
+    assert "1 grade correction" in facts(checklist, "9")
     numbers = "Session test: 2 raters, 3 models, 6 ratings, 0 missing."
     assert numbers in facts(checklist, "11")
     # every file that is named has its hash
@@ -180,7 +180,7 @@ def test_cosmin_has_its_six_standards_and_no_grade(rated: Small) -> None:
     assert not re.search("very good|adequate|doubtful", said.lower())
     assert "9 to 9, median 9" in facts(checklist, "2")
     assert "Device: simulated in all sessions." in facts(checklist, "3")
-    assert "0 grades missing of 9." in facts(checklist, "6")
+    assert "0 of 9 grades are missing." in facts(checklist, "6")
     # what differs is said: the log of another version, its chain forged anew
     log = study.log_file("R1", "retest")
     head, *later = map(json.loads, log.read_text().splitlines())

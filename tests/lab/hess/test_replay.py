@@ -121,5 +121,5 @@ def test_it_needs_readings_whose_times_grow(times: list[float]) -> None:
     columns = {name: np.zeros(len(times)) for name in RECORDING_COLUMNS}
     columns["time_s"] = np.array(times)
     recording = Recording(columns=columns, facts={})
-    with pytest.raises(DeviceError, match="readings whose times grow from 0 on"):
+    with pytest.raises(DeviceError, match="readings whose times grow from 0"):
         replaying(recording, SimulatedClock())

@@ -107,7 +107,7 @@ def test_all_that_a_rater_must_know_is_printed(new_study: New) -> None:
     for words in (
         "<p>Sit.</p><p>Move the arm.</p>",
         "Modified Ashworth Scale",
-        "words of masrel’s own",
+        "masrel’s own words",
         "<dt>1+</dt><dd>tone slightly up",
         "Stretch 1: slow, at most 10 deg/s (V1). Stretch 2: fast",
     ):

@@ -68,7 +68,7 @@ TOLD: dict[str, tuple[Ratings, tuple[Any, ...], list[str]]] = {
         ["In session test, 2 of 8 raters graded 2 standard models (3 grades, 1 missin",
          "In test and again in retest, 2 of 3 raters graded 2 standard models:"],
     ),
-    "undefined": (ALIKE, (plan(),), ["Fleiss' κ is undefined, as "]),
+    "undefined": (ALIKE, (plan(),), ["Fleiss' κ is undefined because "]),
     "not there": (
         ALIKE, (plan(models="dummy"),),
         ["Fleiss' κ of the dummy models in session test could not be estimated: no "
@@ -80,7 +80,7 @@ TOLD: dict[str, tuple[Ratings, tuple[Any, ...], list[str]]] = {
     "raters alone": (FULL, (plan(), OF_RATERS), ["lay between 0.000 and 0.333."]),
     "a model that came again": (
         TWICE, (plan(),),
-        ["2 of 8 raters graded 2 standard models, 4 presentations of them, (6 grades"],
+        ["2 of 8 raters graded 2 standard models in 4 presentations (6 grades"],
     ),
     "weights": (
         table_v(), (ALPHA,),

@@ -25,9 +25,9 @@ def presented(**orders: str) -> Ratings:
     return ratings_from_rows(rows, MODIFIED_ASHWORTH)
 
 
-PLACE = "Second half of a session minus first half"
-NEIGHBOUR = "After a model graded higher minus after one graded lower"
-AGAIN = "Second presentation in a session minus first"
+PLACE = "Second half of a session less first half"
+NEIGHBOUR = "After a model graded higher less after one graded lower"
+AGAIN = "Second presentation in a session less first"
 
 
 def reported(folder: Path, rows: Ratings) -> ReportFiles:
@@ -125,7 +125,7 @@ def test_a_session_is_held_against_the_one_before(tmp_path: Path) -> None:
     made = ratings_from_rows(rows, MODIFIED_ASHWORTH)
     ((question, found),) = effects(tmp_path, made).items()
     # R1 half a step up on average, R2 none; R3 has no second grade
-    assert question == "Session retest minus session test"
+    assert question == "Session retest less session test"
     assert found[:4] == (2, 3, 2, 0.25)
 
 

@@ -89,7 +89,7 @@ CASES = {
     "all sessions by a program": Case(
         ("SIMULATED DATA: no person gave these grades.", PROGRAM,
          "In session test, 2 of 2 raters completed all 3 presentations",
-         "a simulated hand stretched the arm 1.0 times a presentation",
+         "a simulated hand stretched the arm 1.0 times per presentation",
          "In session retest, 1 of 1 rater completed all 3 presentations",
          "drawn with a secret that is not published", "No unblinding is recorded.",
          "\nSimulated data.\n", "stamp='SIMULATED DATA')"),

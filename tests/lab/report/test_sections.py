@@ -246,11 +246,12 @@ SAYS: dict[str, tuple[Protocol, Ratings, list[str]]] = {
     "no aims": (
         study(sections=("confusion",)),
         ratings(("test", "R1", "D01", "1"), ("test", "R2", "D01", "1")),
-        ["data: grades by intended one (no model with an intended grade has ratings)."],
+        ["data: grades by intended grade (no model with an intended grade has "
+         "ratings)."],
     ),
     "no order": (
         study(plan(), sections=("order",)), table_v(),
-        ["Not in these data: effects of order (neither are the places"],
+        ["Not in these data: effects of order (the positions of"],
     ),
     "nobody in person": (
         study(sections=("in-person",)), ONE,

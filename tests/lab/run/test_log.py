@@ -363,7 +363,7 @@ def test_a_log_says_where_its_session_stands(
         ([BEGUN, CORRECTED], "line 2: correction: needed a code that was presented"),
         (
             [step("session", format=2, grades="console"), A_SHOWN, OTHER_SOURCE],
-            "line 3: resumed: needed a session that goes on with console, got script",
+            "line 3: resumed: needed a session that resumes with console, got script",
         ),
         ([BEGUN, A_SHOWN, TAKEN], "line 3: correction: needed a code that has a gra"),
         ([BEGUN, FAULT, SKIPPED, TAKEN], "line 4: correction: needed a code that has"),
