@@ -6,7 +6,6 @@ masrel, and what happens after a crash.
 """
 
 import errno
-import hashlib
 import json
 import math
 import os
@@ -33,6 +32,7 @@ from masrel.lab._study_files import (
     once,
     parse_json,
     read_regular,
+    sha256_of,
 )
 
 if sys.platform != "win32":
@@ -132,14 +132,9 @@ def _split_lines(data: bytes) -> tuple[list[bytes], bytes]:
     return lines, torn
 
 
-def _line_hash(line: bytes) -> str:
-    """Return the SHA-256 of a line without its newline, in hexadecimal."""
-    return hashlib.sha256(line).hexdigest()
-
-
 def line_hashes(path: Path) -> tuple[str, ...]:
     """Return the SHA-256 of every whole line of a log, whatever is in it."""
-    return tuple(_line_hash(line) for line in _split_lines(_read(path))[0])
+    return tuple(sha256_of(line) for line in _split_lines(_read(path))[0])
 
 
 def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
@@ -155,7 +150,7 @@ def _verify(path: Path, lines: list[bytes]) -> tuple[Event, ...]:
                 + (f" (the hash of line {number - 1})" if number > 1 else "")
                 + f", got {claimed}: a line before was changed, removed or added"
             )
-        previous = _line_hash(line)
+        previous = sha256_of(line)
     return tuple(events)
 
 
@@ -318,7 +313,7 @@ class SessionLog:
         lines, torn = _split_lines(data)
         self._events += _verify(self.path, lines)
         if lines:
-            self._previous = _line_hash(lines[-1])
+            self._previous = sha256_of(lines[-1])
         os.lseek(descriptor, len(data) - len(torn), os.SEEK_SET)
         if torn:
             self._take_in(torn, len(lines) + 1)
@@ -327,7 +322,7 @@ class SessionLog:
         facts: dict[str, Fact] = {
             "line": line,
             "n_bytes": len(torn),
-            "sha256": _line_hash(torn),
+            "sha256": sha256_of(torn),
         }
         # A line's closing brace is its last byte: what parses is a whole event.
         if _is_event(self.path, line, torn, self._previous):
@@ -403,7 +398,7 @@ class SessionLog:
                 os.close(descriptor)
         event, _ = _parse_line(self.path, len(self._events) + 1, line)
         self._events.append(event)
-        self._previous = _line_hash(line)
+        self._previous = sha256_of(line)
         self._descriptor = descriptor
 
     def close(self) -> None:

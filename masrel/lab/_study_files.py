@@ -7,6 +7,7 @@ up, no file fills the memory, and no nesting or number ends in an error of the p
 import csv
 import errno
 import functools
+import hashlib
 import io
 import json
 import math
@@ -108,6 +109,11 @@ def regular(descriptor: int, path: Path) -> int:
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     raise OSError(errno.EINVAL, "not a regular file", str(path))
+
+
+def sha256_of(content: bytes | memoryview) -> str:
+    """Return the SHA-256 of what a file holds, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()
 
 
 def repeated(values: Sequence[str]) -> list[bool]:

@@ -8,7 +8,6 @@ standards of studies on reliability, which the author grades and masrel does not
 Topics are in our words; what the record says is in ``report/templates/facts.txt``.
 """
 
-import hashlib
 import statistics
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,7 +22,7 @@ import masrel
 from masrel._files import write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab._study_files import MAX_TABLE, read_regular
+from masrel.lab._study_files import MAX_TABLE, read_regular, sha256_of
 from masrel.lab.analysis import Analysis, analyze
 from masrel.lab.conduct._plan_versions import plan_changes, plan_versions
 from masrel.lab.progress import (
@@ -320,9 +319,7 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
         items=items,
         notes=_notes(facts),
         files={
-            file.as_posix(): hashlib.sha256(
-                read_regular(study.root / file, most=MAX_TABLE)
-            ).hexdigest()
+            file.as_posix(): sha256_of(read_regular(study.root / file, most=MAX_TABLE))
             for file in named
         },
         masrel_version=masrel.__version__,

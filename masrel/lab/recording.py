@@ -4,7 +4,6 @@ A recording is two files side by side: ``NAME.npz`` with the columns, units in
 their names, and ``NAME.json`` with the facts and the SHA-256 of the first.
 """
 
-import hashlib
 import io
 import json
 import re
@@ -28,6 +27,7 @@ from masrel.lab._study_files import (
     check_format,
     parse_json,
     read_regular,
+    sha256_of,
 )
 
 __all__ = [
@@ -384,7 +384,7 @@ def write_recording(recording: Recording, path: Path) -> str:
     archive = io.BytesIO()
     # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
     np.savez_compressed(archive, **ordered)  # type: ignore[arg-type]
-    checksum = hashlib.sha256(archive.getbuffer()).hexdigest()
+    checksum = sha256_of(archive.getbuffer())
     document: dict[str, object] = {
         **recording.facts,
         "format": _FORMAT,
@@ -429,7 +429,7 @@ def read_recording(path: Path) -> Recording:
     version = facts.pop("format", 1)
     check_format(facts_path, version, newest=_FORMAT, error=RecordingError)
     data = read_regular(path, most=MAX_RECORDING)
-    checksum = hashlib.sha256(data).hexdigest()
+    checksum = sha256_of(data)
     if facts.pop("sha256") != checksum:
         raise RecordingError(
             f"{path}: is not the file whose checksum {facts_path} holds"

@@ -3,7 +3,6 @@
 What a job is told of them: estimates and gates as JUnit and as Markdown.
 """
 
-import hashlib
 import math
 import os
 from collections.abc import Mapping
@@ -18,7 +17,7 @@ from masrel.analysis._gates import Gate, GateResult
 from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
 from masrel.errors import ParameterError
-from masrel.lab._study_files import no_follow
+from masrel.lab._study_files import no_follow, sha256_of
 from masrel.lab.report._report_folder import file_hash
 
 if TYPE_CHECKING:
@@ -84,7 +83,7 @@ def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> dict[str, Any
 def conclude(verdict: Mapping[str, Any], options: GateOptions) -> None:
     """Write a verdict, say which gates fail, and end with 1 if one does."""
     junit, text = options.junit, verdict["junit"]
-    digest = hashlib.sha256(text.encode()).hexdigest()
+    digest = sha256_of(text.encode())
     if junit is not None and file_hash(str(junit)) != digest:
         write_file(junit, text)
     for line in verdict["lines"]:

@@ -3,7 +3,6 @@
 The angles of Tardieu of joints, and models between models.
 """
 
-import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +24,7 @@ from masrel.cli._options import (
 )
 from masrel.cli._paths import InputFile, note_inputs, refuse_inputs
 from masrel.errors import ParameterError
-from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
+from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular, sha256_of
 
 if TYPE_CHECKING:
     from masrel.lab.elbow import ElbowParameters, JointModel
@@ -365,7 +364,7 @@ def _source(name: str, model: str) -> tuple[str, bool]:
             f"{model}: simulated must be true or false, because models made from it "
             f"inherit it; got {'nothing' if simulated is None else repr(simulated)}"
         )
-    checksum = hashlib.sha256(content).hexdigest()
+    checksum = sha256_of(content)
     return f"{name} ({model}, sha256 {checksum[:16]})", simulated
 
 

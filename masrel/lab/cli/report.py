@@ -1,6 +1,5 @@
 """``masrel report``: write the report of a study."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -31,6 +30,7 @@ from masrel.lab._study_files import (
     parse_json,
     read_once,
     read_regular,
+    sha256_of,
 )
 from masrel.lab.cli._gating import GateOptions, conclude, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
@@ -329,7 +329,7 @@ def _made(
         )
     return files, {
         # of what is written, not of what is there: others may write there, too
-        "manifest": hashlib.sha256(files[MANIFEST]).hexdigest(),
+        "manifest": sha256_of(files[MANIFEST]),
         "notes": notes_of_call(),
         "read": f"read: {data.read}",
         "pages": [

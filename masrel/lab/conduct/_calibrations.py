@@ -4,7 +4,6 @@ In: what was measured. Out: the file, and the last one of the device of a study.
 is replaced, so that the hash that a recording has stays that of a file.
 """
 
-import hashlib
 import math
 from collections.abc import Callable, Iterator
 from datetime import datetime
@@ -16,7 +15,7 @@ import msgspec
 from masrel._files import write_files
 from masrel.errors import ParameterError
 from masrel.lab._event_log import utc_now
-from masrel.lab._study_files import MAX_SMALL, check_format, read_regular
+from masrel.lab._study_files import MAX_SMALL, check_format, read_regular, sha256_of
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.recording import _TORQUE_GAINS
 
@@ -89,15 +88,13 @@ def read_calibrations(study: StudyPaths) -> Iterator[tuple[Calibration, str]]:
         except msgspec.DecodeError as error:
             raise ParameterError(f"{file}: needed a calibration ({error})") from error
         check_format(file, calibration.format, newest=_FORMAT, error=ParameterError)
-        yield calibration, hashlib.sha256(data).hexdigest()
+        yield calibration, sha256_of(data)
 
 
 def calibration_hashes(study: StudyPaths) -> frozenset[str]:
     """Return the SHA-256 of each file of a calibration, whether it is whole or not."""
     files = study.calibrations.glob("*.json")
-    return frozenset(
-        hashlib.sha256(read_regular(file, most=MAX_SMALL)).hexdigest() for file in files
-    )
+    return frozenset(sha256_of(read_regular(file, most=MAX_SMALL)) for file in files)
 
 
 def last_calibration(

@@ -3,7 +3,6 @@
 Every draw and amendment leaves a copy of the protocol in the log of the study.
 """
 
-import hashlib
 import json
 import sys
 from bisect import bisect_left
@@ -23,7 +22,7 @@ import msgspec
 import masrel
 from masrel.errors import MasrelError, ParameterError, SessionLogError
 from masrel.lab._event_log import Event, timed_events, utc_now
-from masrel.lab._study_files import as_then
+from masrel.lab._study_files import as_then, sha256_of
 from masrel.lab.conduct._study_log import (
     VERSIONS,
     events_of_logs,
@@ -132,7 +131,7 @@ def _copy_of(log: Path, event: Event) -> Protocol:
     text, copy = str(event.fields["protocol"]).encode(), None
     with suppress(msgspec.DecodeError):
         copy = msgspec.json.decode(text, type=Protocol)
-    got, needed = hashlib.sha256(text).hexdigest(), event.fields["protocol_sha256"]
+    got, needed = sha256_of(text), event.fields["protocol_sha256"]
     if copy is None or got != needed:
         raise SessionLogError(
             f"{log}: line {event.line}: {event.kind}: needed the protocol with SHA-256 "

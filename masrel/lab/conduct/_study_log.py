@@ -3,7 +3,6 @@
 ``conduct.jsonl`` is a chain of events as a session log is one.
 """
 
-import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,7 +26,7 @@ from masrel.lab._event_log import (
     timed_events,
     utc_now,
 )
-from masrel.lab._study_files import Fact
+from masrel.lab._study_files import Fact, sha256_of
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash, scale_of
 from masrel.lab.protocol._values import Answer
 from masrel.lab.protocol.content import (
@@ -132,7 +131,7 @@ def conduct_hash(study: StudyPaths) -> str | None:
     """Return a hash of what `read_conduct` returns; None where that is nothing."""
     facts = [(e.time_utc, e.kind, dict(e.fields)) for e in read_conduct(study)]
     text = json.dumps(facts, sort_keys=True).encode()
-    return hashlib.sha256(text).hexdigest() if facts else None
+    return sha256_of(text) if facts else None
 
 
 def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
@@ -338,7 +337,7 @@ def version_of(protocol: Protocol) -> dict[str, str]:
     return {
         "protocol_sha256": protocol_hash(protocol),
         "protocol": _protocol_content(protocol).decode(),
-        "texts_sha256": hashlib.sha256(json.dumps(texts).encode()).hexdigest(),
+        "texts_sha256": sha256_of(json.dumps(texts).encode()),
     }
 
 

@@ -7,7 +7,6 @@ standard, https://w3id.org/ro/crate/1.1.
 """
 
 import gzip
-import hashlib
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from datetime import date
@@ -20,7 +19,7 @@ import masrel
 from masrel._files import write_files
 from masrel._input import check_option
 from masrel.errors import ParameterError
-from masrel.lab._study_files import MAX_RECORDING, new_folder, read_regular
+from masrel.lab._study_files import MAX_RECORDING, new_folder, read_regular, sha256_of
 from masrel.lab.export._dataset import (
     MISSING,
     Dataset,
@@ -254,7 +253,7 @@ def _ro_crate_files(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
                 "@type": "File",
                 "name": place,
                 "contentSize": str(len(content)),
-                "sha256": hashlib.sha256(content).hexdigest(),
+                "sha256": sha256_of(content),
                 "encodingFormat": _FORMATS.get(suffix, "application/octet-stream"),
             }
         )

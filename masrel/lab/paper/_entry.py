@@ -1,6 +1,5 @@
 """Sheets that were filled in, brought into session logs, and second entries."""
 
-import hashlib
 import re
 from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
@@ -10,7 +9,7 @@ import masrel
 from masrel._files import check_inside
 from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.lab._event_log import Event, SessionLog, utc_now
-from masrel.lab._study_files import Fact
+from masrel.lab._study_files import Fact, sha256_of
 from masrel.lab.conduct._study_log import (
     append_event,
     past_day,
@@ -164,7 +163,7 @@ def _begin(
         "rater": form.rater,
         "session": form.session,
         "presented_sha256": presented_hash(protocol),
-        "schedule_sha256": hashlib.sha256(schedule_file.read_bytes()).hexdigest(),
+        "schedule_sha256": sha256_of(schedule_file.read_bytes()),
         "simulated": False,
         "grades": FROM_PAPER,
         "device": device,

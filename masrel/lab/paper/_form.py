@@ -1,7 +1,6 @@
 """What a sheet asks for, compared with what was typed."""
 
 import csv
-import hashlib
 import io
 import json
 import re
@@ -17,6 +16,7 @@ from masrel.lab._study_files import (
     check_format,
     csv_format,
     read_regular,
+    sha256_of,
 )
 from masrel.lab.protocol import Protocol, Question
 from masrel.lab.protocol._values import Answer, When, checked_answer, questions_of
@@ -104,7 +104,7 @@ def _id_of(study: str, rater: str, session: str, codes: Sequence[str]) -> str:
     # Of blinded codes alone, so that it says nothing about the order of models; the
     # letter and the hyphen keep spreadsheets from taking it for a number.
     content = json.dumps([study, rater, session, *codes]).encode()
-    digest = hashlib.sha256(content).hexdigest().upper()
+    digest = sha256_of(content).upper()
     return f"S{digest[:4]}-{digest[4:8]}"
 
 
@@ -160,7 +160,7 @@ def read_typed(path: Path) -> TypedSheet:
     columns = _columns(path, start + 1, records[start])
     return TypedSheet(
         path=path,
-        sha256=hashlib.sha256(data).hexdigest(),
+        sha256=sha256_of(data),
         columns=tuple(name for name in columns if name),
         rows=tuple(_rows(path, start, columns, records)),
     )

@@ -1,6 +1,5 @@
 """What a protocol says to others: scale, joints in SI units, gates, hashes."""
 
-import hashlib
 import math
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -10,7 +9,7 @@ import msgspec
 
 from masrel.analysis._gates import Gate, read_gate
 from masrel.errors import ParameterError, ProtocolError
-from masrel.lab._study_files import once
+from masrel.lab._study_files import once, sha256_of
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import JointModel
 from masrel.lab.protocol._kinds import DEFAULT_KIND, model_of_kind, without_defaults
@@ -277,7 +276,7 @@ def protocol_hash(protocol: Protocol) -> str:
         file do not enter. From a model file its numbers enter, its name, and whether
         it comes from simulated recordings.
     """
-    return hashlib.sha256(_protocol_content(protocol)).hexdigest()
+    return sha256_of(_protocol_content(protocol))
 
 
 @once
@@ -302,7 +301,7 @@ def presented_hash(protocol: Protocol) -> str:
     a rater or wording a title better makes nobody's drawn schedule stale. Nor do
     ``device.torque_sensor`` and ``device.calibration_max_days``, which no rater feels.
     """
-    return hashlib.sha256(presented_content(protocol)).hexdigest()
+    return sha256_of(presented_content(protocol))
 
 
 def presented_content(protocol: Protocol) -> bytes:

@@ -1,6 +1,5 @@
 """A study's ratings: from its logs where it has some, from a file where it has not."""
 
-import hashlib
 import math
 import statistics
 from collections.abc import Callable, Iterable, Iterator
@@ -19,6 +18,7 @@ from masrel.lab._study_files import (
     format_problem,
     read_once,
     read_regular,
+    sha256_of,
 )
 from masrel.lab.conduct import PlanChange, excluded_raters, plan_changes
 from masrel.lab.conduct._plan_versions import is_of_earlier
@@ -409,7 +409,7 @@ def _schedule(
     schedule = read_schedule(path)
     check_schedule(schedule, protocol)
     data = read_regular(path, most=MAX_SMALL)
-    if state.header["schedule_sha256"] != hashlib.sha256(data).hexdigest():
+    if state.header["schedule_sha256"] != sha256_of(data):
         raise RatingsError(f"{log}: was recorded with another schedule than {path}")
     codes = {shown.code for shown in schedule.presentations}
     for code, events in state.presented.items():
@@ -426,7 +426,7 @@ def _check_recording(study: StudyPaths, log: Path, event: Event) -> None:
     if not path.is_file():
         return
     data = read_regular(path, most=MAX_RECORDING)
-    if hashlib.sha256(data).hexdigest() != event.fields["sha256"]:
+    if sha256_of(data) != event.fields["sha256"]:
         raise RatingsError(
             f"{log}: line {event.line}: {path} is not the recording whose checksum "
             "this line holds"

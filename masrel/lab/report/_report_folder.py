@@ -36,6 +36,7 @@ from masrel.lab._study_files import (
     read_object,
     read_regular,
     regular,
+    sha256_of,
 )
 
 if sys.platform != "win32":
@@ -68,7 +69,7 @@ def report_files(
     document = {
         "format": _REPORT_FORMAT,
         "inputs": dict(inputs),
-        "files": {place: _hash(data) for place, data in written.items()},
+        "files": {place: sha256_of(data) for place, data in written.items()},
         **({} if pandoc is None else {"pandoc": pandoc}),
         **({"private": True} if is_private else {}),
     }
@@ -89,7 +90,7 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
         if changed or stale or is_cut_off:
             known = _known_files(folder)
             for place, data in files.items():
-                known.setdefault(place, []).append(_hash(data))
+                known.setdefault(place, []).append(sha256_of(data))
             contents: dict[Path, bytes | str | None] = {
                 folder / UNFINISHED: json.dumps({"format": 1, "files": known}),
                 folder / MANIFEST: None,
@@ -133,12 +134,10 @@ def report_changes(
     folder: Path, files: Mapping[str, bytes]
 ) -> tuple[list[str], list[Path]]:
     """Return files that a folder lacks, and those in it of a report before."""
-    changed = [n for n, data in files.items() if _differs(folder / n, {_hash(data)})]
+    changed = [
+        n for n, data in files.items() if _differs(folder / n, {sha256_of(data)})
+    ]
     return changed, [*_stale_files(folder, files)]
-
-
-def _hash(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
 
 
 def _differs(path: Path, hashes: Collection[str]) -> bool:
@@ -222,7 +221,7 @@ def made_from(
 
 def note_of(folder: Path, notes: Path) -> Path:
     """Return the note, in a folder of notes, of the report in a folder."""
-    return notes / f"{_hash(os.path.abspath(folder).encode())}.json"
+    return notes / f"{sha256_of(os.path.abspath(folder).encode())}.json"
 
 
 def last_shown(note: Path, made: str, folder: Path) -> dict[str, Any] | None:
@@ -252,7 +251,7 @@ def keep_shown(
 
 def _seal(made: str, text: bytes) -> bytes:
     # of both: a note under another's name is of no use
-    return _hash(made.encode() + text).encode()
+    return sha256_of(made.encode() + text).encode()
 
 
 def _files_below(folder: Path, but: Collection[str]) -> Iterator[str]:

@@ -3,7 +3,6 @@
 import contextlib
 import dataclasses
 import functools
-import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from masrel.lab._study_files import Fact, Facts
+from masrel.lab._study_files import Fact, Facts, sha256_of
 from masrel.lab.conduct._calibrations import Calibration
 from masrel.lab.elbow import JointModel
 from masrel.lab.elbow.tone import _caught
@@ -200,7 +199,7 @@ def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome
     if not spool.exists():
         return None
     if file.exists():  # it died between the recording and the log
-        checksum = hashlib.sha256(file.read_bytes()).hexdigest()
+        checksum = sha256_of(file.read_bytes())
         model = request.presentation.model
         return _outcome(read_recording(file), protocol, model, file, checksum)
     presented = cut_off(spool)
@@ -383,7 +382,7 @@ def _outcome(
     logged: dict[str, Facts] = {
         "recording": f"{file.parent.name}/{file.name}",
         "sha256": sha256,
-        "facts_sha256": hashlib.sha256(beside).hexdigest(),
+        "facts_sha256": sha256_of(beside),
         # before the catch; None when the arm never moved
         "mean_speed_deg_s": None if speed is None else float(speed),
         "n_missed_ticks": int(facts["n_missed_ticks"] or 0),

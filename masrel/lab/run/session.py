@@ -4,7 +4,6 @@ Started again, a session resumes where its log ends: what has a grade keeps it, 
 what was presented but not graded is presented again and logged as another attempt.
 """
 
-import hashlib
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -18,7 +17,7 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.lab._event_log import Event, SessionLog, utc_now
-from masrel.lab._study_files import Facts
+from masrel.lab._study_files import Facts, sha256_of
 from masrel.lab.conduct._statements import refuse_withdrawn
 from masrel.lab.conduct._study_log import (
     append_event,
@@ -182,7 +181,7 @@ def run_session(
     else:
         schedule = _drawn_schedule(study, protocol, rater, session)
         file = study.schedule_file(rater, session)
-        checksum = hashlib.sha256(file.read_bytes()).hexdigest()
+        checksum = sha256_of(file.read_bytes())
     log_file = study.log_file(rater, session)
     check_inside(log_file.parent, study.root)
     both = (*schedule.presentations, *practice_presentations(protocol))

@@ -1,6 +1,5 @@
 """The files of schedules and sheets: drawn once, kept, found stale, counted."""
 
-import hashlib
 import json
 import os
 import shlex
@@ -14,7 +13,7 @@ from pathlib import Path
 from masrel._files import make_folder, write_files
 from masrel._input import listed
 from masrel.errors import ScheduleError
-from masrel.lab._study_files import MAX_SMALL, read_regular
+from masrel.lab._study_files import MAX_SMALL, read_regular, sha256_of
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
@@ -477,7 +476,7 @@ def _stale_sentences(
 
 def _changes(protocol: Protocol, file: Path, sha256: str) -> str:
     drawn = file.read_bytes() if file.is_file() else b""
-    if hashlib.sha256(drawn).hexdigest() != sha256:
+    if sha256_of(drawn) != sha256:
         return (
             "a key of the study id, scale, elbow, models, schedule, stretch, "
             "presentation, occasions or device has changed"

@@ -1,6 +1,5 @@
 """Who is let in: one-time addresses, signed cookies, and whose tablet a tablet is."""
 
-import hashlib
 import hmac
 import io
 import json
@@ -17,7 +16,7 @@ import segno
 
 from masrel._files import write_files
 from masrel.errors import MasrelError, ParameterError
-from masrel.lab._study_files import MAX_SMALL, parse_json, read_regular
+from masrel.lab._study_files import MAX_SMALL, parse_json, read_regular, sha256_of
 from masrel.lab.protocol import StudyPaths
 
 Role = Literal["rater", "coordinator"]
@@ -145,7 +144,7 @@ class Access:
     def cookie_name(self, role: Role) -> str:
         """Return the name of a role's cookie: browsers mix those of all ports."""
         prefix = "__Host-" if self.is_encrypted else ""
-        return f"{prefix}masrel-{role}-{hashlib.sha256(self._key).hexdigest()[:8]}"
+        return f"{prefix}masrel-{role}-{sha256_of(self._key)[:8]}"
 
     def visitor(self, role: Role, cookies: Mapping[str, str]) -> Visitor | None:
         """Return who comes with these cookies, or None."""

@@ -3,7 +3,6 @@
 An anchor is the hash of a log's last line, kept where the study is not.
 """
 
-import hashlib
 import json
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -23,6 +22,7 @@ from masrel.lab._study_files import (
     format_problem,
     parse_json,
     read_regular,
+    sha256_of,
 )
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import _FORMAT as _RECORDING_FORMAT
@@ -142,7 +142,7 @@ def hashed_facts(
                 raise
             needed = f"needed a recording that {where} names, got no file"
             return None, [*findings, broken(file, needed)]
-        if sha256 not in (None, hashlib.sha256(data).hexdigest()):
+        if sha256 not in (None, sha256_of(data)):
             findings.append(broken(file, f"is not the file whose SHA-256 {where} has"))
     return data, findings
 

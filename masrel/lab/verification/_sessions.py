@@ -1,6 +1,5 @@
 """Logs of sessions, rehearsals and trainings, and the recordings that they name."""
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -9,7 +8,7 @@ from typing import Any, Literal
 
 from masrel.errors import ParameterError, ScheduleError
 from masrel.lab._event_log import Event, read_log
-from masrel.lab._study_files import MAX_SMALL, read_regular
+from masrel.lab._study_files import MAX_SMALL, read_regular, sha256_of
 from masrel.lab.conduct._calibrations import calibration_hashes
 from masrel.lab.protocol import Protocol, Question, StudyPaths, presented_hash
 from masrel.lab.protocol._values import checked_answer
@@ -100,7 +99,7 @@ def check_session(
             findings=findings,
             log=log,
         )
-    checksum = hashlib.sha256(read_regular(file, most=MAX_SMALL)).hexdigest()
+    checksum = sha256_of(read_regular(file, most=MAX_SMALL))
     return _against_schedule(study, protocol, schedule, events, state, checksum)
 
 

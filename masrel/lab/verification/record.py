@@ -1,6 +1,5 @@
 """The record of a study, from protocol to report, each file compared with the last."""
 
-import hashlib
 import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,6 +26,7 @@ from masrel.lab._study_files import (
     read_object,
     read_once,
     read_regular,
+    sha256_of,
 )
 from masrel.lab.conduct import excluded_raters, plan_changes, read_conduct
 from masrel.lab.conduct._plan_versions import is_of_earlier, plan_versions
@@ -434,7 +434,7 @@ def _material(
     inputs = _inputs(protocol, ratings, in_person, answers)
     is_other = former not in (None, inputs["ratings_sha256"])
     texts = _texts(ratings) if is_other and not ratings.source_path else ()
-    if former in {hashlib.sha256(text.encode()).hexdigest() for text in texts}:
+    if former in {sha256_of(text.encode()) for text in texts}:
         inputs["ratings_sha256"] = str(former)
     return {
         "protocol": protocol,
@@ -506,4 +506,4 @@ def _file_findings(manifest: Path, files: Mapping[str, object]) -> Iterator[Find
 
 
 def _sha256(path: Path) -> str:
-    return hashlib.sha256(read_regular(path, most=MAX_RECORDING)).hexdigest()
+    return sha256_of(read_regular(path, most=MAX_RECORDING))

@@ -5,7 +5,6 @@ what must not be used marked.
 """
 
 import csv
-import hashlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from masrel._input import not_utf8, refuse, warn_caller
 from masrel.errors import RecordingError, RecordingWarning
-from masrel.lab._study_files import MAX_RECORDING, read_regular
+from masrel.lab._study_files import MAX_RECORDING, read_regular, sha256_of
 from masrel.lab.recording import (
     _FIRST_COLUMNS,
     MEASURED_TORQUE,
@@ -332,7 +331,7 @@ def _read_archive(path: Path, content: bytes) -> _Table:
         column=column,
         simulated=simulated,
         model=model if isinstance(model, str) else None,
-        sha256=hashlib.sha256(content).hexdigest(),
+        sha256=sha256_of(content),
     )
 
 
@@ -381,7 +380,7 @@ def _read_text(path: Path, content: bytes) -> _Table:
         column=column,
         simulated=("simulated", "true")
         in [(k.strip(), v.strip()) for k, _, v in pairs],
-        sha256=hashlib.sha256(content).hexdigest(),
+        sha256=sha256_of(content),
     )
 
 
