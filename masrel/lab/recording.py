@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel._files import write_files
+from masrel._input import refuse
 from masrel.errors import ParameterError, RecordingError
 from masrel.lab._study_files import (
     MAX_RECORDING,
@@ -373,12 +374,14 @@ def write_recording(recording: Recording, path: Path) -> str:
     OSError
         If the files cannot be written.
     """
-    if path.suffix != ".npz":
-        raise RecordingError(f"{path}: the file of a recording must end in .npz")
-    if path.exists():
-        raise RecordingError(
-            f"{path}: needs a new file, a recording is never overwritten; move it away"
-        )
+    refuse(
+        (path.suffix != ".npz", f"{path}: the file of a recording must end in .npz"),
+        (
+            path.exists(),
+            f"{path}: needs a new file, a recording is never overwritten; move it away",
+        ),
+        error=RecordingError,
+    )
     channels = [channel.column for channel in recording.channels]
     ordered = {n: recording.columns[n] for n in (*RECORDING_COLUMNS, *channels)}
     archive = io.BytesIO()

@@ -20,7 +20,8 @@ from typing import Any
 import msgspec
 
 import masrel
-from masrel.errors import MasrelError, ParameterError, SessionLogError
+from masrel._input import refuse
+from masrel.errors import MasrelError, SessionLogError
 from masrel.lab._event_log import Event, timed_events, utc_now
 from masrel.lab._study_files import as_then, sha256_of
 from masrel.lab.conduct._study_log import (
@@ -295,15 +296,18 @@ def record_amendment(
     reasons = stated(who=who, why=why)
     recover_conduct(study)
     before = last_version(event for _, event in events_of_logs(study))
-    if before is None:
-        raise ParameterError(
+    refuse(
+        (
+            before is None,
             "study: needed one with drawn schedules, got none: until then the protocol "
-            "is the plan"
-        )
-    if before == protocol_hash(protocol):
-        raise ParameterError(
-            f"protocol: needed another than is recorded, {study.protocol} says the same"
-        )
+            "is the plan",
+        ),
+        (
+            before == protocol_hash(protocol),
+            f"protocol: needed another than is recorded, {study.protocol} says the "
+            "same",
+        ),
+    )
     with open_conduct(study, protocol, now=now) as log:
         log.append("amended", {**version_of(protocol), **reasons})
     return plan_changes(study, protocol)

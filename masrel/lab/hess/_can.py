@@ -16,17 +16,18 @@ from typing import (
     Any,
     ClassVar,
     Generic,
+    Literal,
     NamedTuple,
     Self,
     TypeVar,
 )
 
+from masrel._input import refuse
 from masrel.errors import (
     BusError,
     DeviceError,
     DeviceTimeoutError,
     FrameError,
-    ParameterError,
 )
 from masrel.lab.hess._clock import Clock, SimulatedClock
 from masrel.lab.hess.device import (
@@ -35,7 +36,7 @@ from masrel.lab.hess.device import (
     DeviceSetup,
     IdleCommand,
 )
-from masrel.lab.hess.limits import DeviceLimits
+from masrel.lab.hess.limits import DeviceLimits, _check_positive
 
 if TYPE_CHECKING:
     import can  # loaded when a bus is opened
@@ -260,14 +261,21 @@ class BusOptions(BackendOptions, ABC):
 
     interface: str = "socketcan"
     channel: str = "can0"
+    direction: Literal[1, -1] = 1  # whether its numbers grow with extension
+    gear_ratio: float = 1.0  # turns of it for one of the elbow
+    patience_s: float = 0.001  # how long to wait for an answer: one period of the loop
     emulator: object | None = None  # what an emulated one is like
 
     def __post_init__(self) -> None:
-        if self.emulator is not None and self.interface != "virtual":
-            raise ParameterError(
+        _check_positive(gear_ratio=self.gear_ratio, patience_s=self.patience_s)
+        check_direction(self.direction)
+        refuse(
+            (
+                self.emulator is not None and self.interface != "virtual",
                 f"interface: needs 'virtual' for an emulated {self.name}, "
-                f"got {self.interface!r}"
+                f"got {self.interface!r}",
             )
+        )
 
     @abstractmethod
     def emulated(self, start: float) -> Self:
@@ -394,6 +402,19 @@ class Node(ABC):
                 "error-frames",
             )
 
+    def needs(self, holds: bool, what: str) -> None:
+        """Refuse an amplifier that is not as it must be; what it must be, and is."""
+        refuse((not holds, f"{self.name}: needs {what}"), error=DeviceError)
+
+    def _await(
+        self, is_there: Callable[[], bool], since_ns: int, patience_s: float, what: str
+    ) -> None:
+        # Receives until an answer is there, or refuses to wait any longer
+        if not self._receive_until(is_there, since_ns + round(patience_s * 1e9)):
+            raise DeviceTimeoutError(
+                f"{self.name}: {what} within {patience_s * 1e3:g} ms"
+            )
+
     def wait(self, duration_s: float) -> None:
         """Let time pass without sending a frame."""
         self.clock.sleep_until_ns(self.clock.now_ns() + round(duration_s * 1e9))
@@ -435,15 +456,18 @@ def options_of(setup: DeviceSetup, kind: type[_Options]) -> _Options:
     if not isinstance(options, kind):
         got = type(options).__name__
         raise DeviceError(f"{name}: needs options of type {kind.__name__}, got {got}")
-    if (hand is None) != (options.emulator is None):
-        raise DeviceError(
+    refuse(
+        (
+            (hand is None) != (options.emulator is None),
             f"{name}: needs a simulated hand with an emulated {name} and none without, "
-            "got " + ("an emulator alone" if hand is None else "a hand alone")
-        )
-    if hand is None and isinstance(setup.clock, SimulatedClock):
-        raise DeviceError(
-            f"{name}: needs a real clock, its bus is outside this process"
-        )
+            "got " + ("an emulator alone" if hand is None else "a hand alone"),
+        ),
+        (
+            hand is None and isinstance(setup.clock, SimulatedClock),
+            f"{name}: needs a real clock, its bus is outside this process",
+        ),
+        error=DeviceError,
+    )
     return options
 
 
@@ -498,14 +522,26 @@ class CanDevice(Device, Generic[_Options]):
 def check_angle(name: str, angle: float) -> None:
     """Refuse an arm that is where no elbow can be."""
     limits = DeviceLimits()
-    if not limits.lowest_angle <= angle <= limits.highest_angle:
-        raise DeviceError(
+    refuse(
+        (
+            not limits.lowest_angle <= angle <= limits.highest_angle,
             f"{name}: needs an arm between -5 and 185 deg, it reports "
-            f"{math.degrees(angle):.1f}; run masrel device zero"
+            f"{math.degrees(angle):.1f}; run masrel device zero",
+        ),
+        error=DeviceError,
+    )
+
+
+def check_elbow_angle(angle: float) -> None:
+    """Refuse an angle, rad, that no arm can be held at while it is zeroed."""
+    refuse(
+        (
+            not 0.0 <= angle <= math.pi,
+            f"angle: needs 0 to 180 degrees, got {angle} rad",
         )
+    )
 
 
 def check_direction(direction: int) -> None:
     """Refuse a direction that is neither with nor against extension."""
-    if direction not in (1, -1):
-        raise ParameterError(f"direction: needs 1 or -1, got {direction}")
+    refuse((direction not in (1, -1), f"direction: needs 1 or -1, got {direction}"))

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from masrel.errors import FrameError, ParameterError
+from masrel._input import refuse
+from masrel.errors import FrameError
 from masrel.lab.hess._can import BUS_OFF, BUS_RESTARTED, Frame, Link
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._simulated import Plant, PlantParameters
@@ -96,17 +97,19 @@ class InjectedFault:
     size: float | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(FaultKind):
-            raise ParameterError(
-                f"kind: needs one of {', '.join(get_args(FaultKind))}, got {self.kind}"
-            )
-        if not 0.0 <= self.start_s < self.end_s:
-            raise ParameterError(
+        kinds = get_args(FaultKind)
+        refuse(
+            (
+                self.kind not in kinds,
+                f"kind: needs one of {', '.join(kinds)}, got {self.kind}",
+            ),
+            (
+                not 0.0 <= self.start_s < self.end_s,
                 "start_s, end_s: need 0 <= start_s < end_s, "
-                f"got {self.start_s} and {self.end_s}"
-            )
-        if self.every < 1:
-            raise ParameterError(f"every: needs 1 or more, got {self.every}")
+                f"got {self.start_s} and {self.end_s}",
+            ),
+            (self.every < 1, f"every: needs 1 or more, got {self.every}"),
+        )
 
     @property
     def amount(self) -> float:

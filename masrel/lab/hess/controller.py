@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NoReturn
 
-from masrel.errors import LimitExceededError, ParameterError
+from masrel._input import refuse
+from masrel.errors import LimitExceededError
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import JointModel
 from masrel.lab.hess._signals import CUTOFF_RAD_S, Flexion, raised_cosine
@@ -109,13 +110,14 @@ class FrictionCompensation:
         dead_zone: float = math.radians(0.1),
         full_speed: float = math.radians(2.0),
     ) -> None:
-        if not 0.0 <= share <= 1.0:
-            raise ParameterError(f"share: needs [0, 1], got {share}")
-        if not 0.0 <= dead_zone < full_speed < math.inf:
-            raise ParameterError(
+        refuse(
+            (not 0.0 <= share <= 1.0, f"share: needs [0, 1], got {share}"),
+            (
+                not 0.0 <= dead_zone < full_speed < math.inf,
                 "dead_zone, full_speed: need 0 <= dead_zone < full_speed, "
-                f"got {dead_zone} and {full_speed}"
-            )
+                f"got {dead_zone} and {full_speed}",
+            ),
+        )
         self._viscous = share * friction.viscous
         self._coulomb = share * friction.coulomb
         self._dead_zone = dead_zone
@@ -259,12 +261,13 @@ class Controller:
         rate_hz: int = 1000,
     ) -> None:
         _check_positive(slip_speed_drop=slip_speed_drop, loose_inertia=loose_inertia)
-        if not 0.0 <= post_catch_ramp <= 1.0:
-            raise ParameterError(
-                f"post_catch_ramp: needs 0 to 1 s, got {post_catch_ramp}"
-            )
-        if rate_hz < 1:
-            raise ParameterError(f"rate_hz: needs 1 or more, got {rate_hz}")
+        refuse(
+            (
+                not 0.0 <= post_catch_ramp <= 1.0,
+                f"post_catch_ramp: needs 0 to 1 s, got {post_catch_ramp}",
+            ),
+            (rate_hz < 1, f"rate_hz: needs 1 or more, got {rate_hz}"),
+        )
         self._joint = model.stepper(start_angle)
         self.is_guarded = not (model.is_passive or isinstance(model, ElbowParameters))
         self.friction = friction or Friction()

@@ -10,7 +10,7 @@ from importlib.metadata import entry_points
 from types import TracebackType
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
-from masrel._input import listed
+from masrel._input import listed, refuse
 from masrel.errors import DeviceError
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess.hand import Hand
@@ -111,15 +111,18 @@ class Device(ABC):
             If it was closed before, cannot be opened, or is hardware that does not say
             whether it holds its torque when nothing is sent.
         """
-        if self._state == "closed":
-            raise DeviceError(
-                f"{self.name}: needs a new device, this one has been closed"
-            )
-        if not self.simulated and self.holds_torque_when_silent is None:
-            raise DeviceError(
+        refuse(
+            (
+                self._state == "closed",
+                f"{self.name}: needs a new device, this one has been closed",
+            ),
+            (
+                not self.simulated and self.holds_torque_when_silent is None,
                 f"{self.name}: needs holds_torque_when_silent, True or False: what it "
-                "does with its last torque when nothing is sent any more"
-            )
+                "does with its last torque when nothing is sent any more",
+            ),
+            error=DeviceError,
+        )
         if self._state == "new":
             self._try("opening", self._start)
             self._state = "open"  # only after it has worked
@@ -379,15 +382,14 @@ def _backend(name: str) -> Any:
     if name in _BACKENDS:
         return importlib.import_module(_BACKENDS[name])
     declared = list(entry_points(group=_GROUP, name=name))
-    if not declared:
-        raise DeviceError(
-            f"device: needs one of {', '.join(device_names())}, got {name!r}"
-        )
     of = sorted(
         f"{of.dist.name} ({of.value})" if of.dist else of.value for of in declared
     )
-    if len(declared) > 1:
-        raise DeviceError(f"device {name!r}: needs one distribution, got {listed(of)}")
+    refuse(
+        (not of, f"device: needs one of {', '.join(device_names())}, got {name!r}"),
+        (len(of) > 1, f"device {name!r}: needs one distribution, got {listed(of)}"),
+        error=DeviceError,
+    )
     try:
         return declared[0].load()
     except Exception as error:  # whatever another's module does

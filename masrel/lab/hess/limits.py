@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from masrel.errors import ParameterError
+from masrel._input import refuse
 
 # No elbow is outside, rad; 5 deg because an end stop gives way a little.
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
@@ -43,16 +43,25 @@ _NOT_NEGATIVE = (
 
 def _check_positive(**values: float) -> None:
     """Refuse the first value that is not above 0, and finite."""
-    for name, value in values.items():
-        if not 0.0 < value < math.inf:
-            raise ParameterError(f"{name}: needs more than 0 and finite, got {value}")
+    refuse(
+        *(
+            (
+                not 0.0 < value < math.inf,
+                f"{name}: needs more than 0 and finite, got {value}",
+            )
+            for name, value in values.items()
+        )
+    )
 
 
 def _check_not_negative(**values: float) -> None:
     """Refuse the first value that is not 0 or more, and finite."""
-    for name, value in values.items():
-        if not 0.0 <= value < math.inf:
-            raise ParameterError(f"{name}: needs 0 or more, got {value}")
+    refuse(
+        *(
+            (not 0.0 <= value < math.inf, f"{name}: needs 0 or more, got {value}")
+            for name, value in values.items()
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,17 +177,23 @@ class DeviceLimits:
     def __post_init__(self) -> None:
         _check_positive(**{name: getattr(self, name) for name in _POSITIVE})
         _check_not_negative(**{name: getattr(self, name) for name in _NOT_NEGATIVE})
-        for name, most in _LONGEST_S.items():
-            value = getattr(self, name)
-            if not 0.0 <= value <= most:
-                raise ParameterError(f"{name}: needs 0 to {most:g} s, got {value}")
-        if not -math.inf < self.lowest_angle < self.highest_angle < math.inf:
-            raise ParameterError(
+        low, high = self.lowest_angle, self.highest_angle
+        refuse(
+            *(
+                (
+                    not 0.0 <= getattr(self, name) <= most,
+                    f"{name}: needs 0 to {most:g} s, got {getattr(self, name)}",
+                )
+                for name, most in _LONGEST_S.items()
+            ),
+            (
+                not -math.inf < low < high < math.inf,
                 "lowest_angle, highest_angle: need finite angles in this order, "
-                f"got {self.lowest_angle} and {self.highest_angle}"
-            )
-        if 2.0 * self.soft_stop_width > self.highest_angle - self.lowest_angle:
-            raise ParameterError(
+                f"got {low} and {high}",
+            ),
+            (
+                2.0 * self.soft_stop_width > high - low,
                 "soft_stop_width: needs at most half of the range, "
-                f"got {self.soft_stop_width} rad"
-            )
+                f"got {self.soft_stop_width} rad",
+            ),
+        )

@@ -10,6 +10,7 @@ import warnings
 from contextlib import closing, suppress
 from pathlib import Path
 
+from masrel._input import refuse
 from masrel._interpreter import collector_off
 from masrel.errors import (
     ControllerError,
@@ -17,7 +18,6 @@ from masrel.errors import (
     DeviceTimeoutError,
     LimitExceededError,
     OverrunWarning,
-    ParameterError,
     RecordingWarning,
 )
 from masrel.lab._study_files import Fact
@@ -223,24 +223,32 @@ def _check(
     max_duration_s: float,
     end_angle: float,
 ) -> None:
-    if rate_hz < 1 or not 0.0 < max_duration_s < math.inf:
-        raise ParameterError(
+    refuse(
+        (
+            rate_hz < 1 or not 0.0 < max_duration_s < math.inf,
             "rate_hz, max_duration_s: need more than 0, "
-            f"got {rate_hz} Hz and {max_duration_s} s"
-        )
-    if not math.isfinite(end_angle):
-        raise ParameterError(f"end_angle: needs a finite angle, got {end_angle} rad")
-    if limits.watchdog_time * rate_hz < 2.0:
-        raise ParameterError(
+            f"got {rate_hz} Hz and {max_duration_s} s",
+        ),
+        (
+            not math.isfinite(end_angle),
+            f"end_angle: needs a finite angle, got {end_angle} rad",
+        ),
+    )
+    refuse(
+        (
+            limits.watchdog_time * rate_hz < 2.0,
             f"watchdog_time: needs two ticks or more, at {rate_hz} Hz "
-            f"{2.0 / rate_hz:g} s, got {limits.watchdog_time:g} s"
-        )
-    if rate_hz != controller.rate_hz:
-        raise ParameterError(
-            f"rate_hz: needs the controller's {controller.rate_hz} Hz, got {rate_hz}"
-        )
-    if not controller.is_new:
-        raise ParameterError("controller: needs a new one for every presentation")
+            f"{2.0 / rate_hz:g} s, got {limits.watchdog_time:g} s",
+        ),
+        (
+            rate_hz != controller.rate_hz,
+            f"rate_hz: needs the controller's {controller.rate_hz} Hz, got {rate_hz}",
+        ),
+        (
+            not controller.is_new,
+            "controller: needs a new one for every presentation",
+        ),
+    )
     if not device.is_open:
         raise DeviceError(f"{device.name}: needs an open device to present on")
 

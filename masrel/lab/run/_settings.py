@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import msgspec
 
-from masrel._input import listed
+from masrel._input import listed, refuse
 from masrel.errors import ParameterError
 from masrel.lab.conduct._calibrations import Calibration, calibration_notes
 from masrel.lab.hess import (
@@ -46,30 +46,36 @@ def check_backend(protocol: Protocol) -> None:
     """Do nothing if a session can be run on the device of a protocol."""
     settings = protocol.device
     names = [name for name in device_names() if name != "replay"]  # that has no hand
-    if settings.backend not in names:
-        raise ParameterError(
+    refuse(
+        (
+            settings.backend not in names,
             f"device.backend: needed one of {', '.join(names)}, "
-            f"got {settings.backend!r}"
-        )
-    for name in settings.backends:
-        if name not in names:
-            raise ParameterError(
+            f"got {settings.backend!r}",
+        ),
+        *(
+            (
+                name not in names,
                 f"device.{name}: needed the table of a device, one of "
-                f"{', '.join(names)}, got [device.{name}]"
+                f"{', '.join(names)}, got [device.{name}]",
             )
-    if settings.torque_sensor and settings.backend != "simulated":
-        raise ParameterError(
+            for name in settings.backends
+        ),
+        (
+            settings.torque_sensor and settings.backend != "simulated",
             "device.torque_sensor: needed false, a device of the backend "
-            f"{settings.backend!r} has no torque sensor; got true"
-        )
+            f"{settings.backend!r} has no torque sensor; got true",
+        ),
+    )
     device_limits(settings)
     backend_options(settings)
     is_asked_for = protocol.presentation.done_with == "button"
-    if is_asked_for and settings.backend not in _WITH_BUTTON:
-        raise ParameterError(
+    refuse(
+        (
+            is_asked_for and settings.backend not in _WITH_BUTTON,
             f"device.backend: needed one with a button ({', '.join(_WITH_BUTTON)}), "
-            f"as presentation.done_with asks for, got {settings.backend!r}"
+            f"as presentation.done_with asks for, got {settings.backend!r}",
         )
+    )
 
 
 def torque_problems(protocol: Protocol) -> Iterator[str]:

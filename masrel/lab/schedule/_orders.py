@@ -6,6 +6,7 @@ from functools import lru_cache
 from math import prod
 from typing import Any
 
+from masrel._input import refuse
 from masrel.errors import ScheduleError
 from masrel.lab.protocol import Protocol, ScheduleScheme
 from masrel.lab.schedule._admissible import (
@@ -107,13 +108,18 @@ _IN_WORDS = {
 
 
 def _check_row(scheme: str, row: int | None) -> None:
-    if scheme not in WITH_ROWS and row is not None:
-        raise ScheduleError(f"row: needed none, scheme {scheme} has no rows, got {row}")
-    if scheme in WITH_ROWS and (row is None or row < 1):
-        raise ScheduleError(
+    refuse(
+        (
+            scheme not in WITH_ROWS and row is not None,
+            f"row: needed none, scheme {scheme} has no rows, got {row}",
+        ),
+        (
+            scheme in WITH_ROWS and (row is None or row < 1),
             f"row: needed a row of the design, from 1, with scheme {scheme}, got "
-            f"{'none' if row is None else row}"
-        )
+            f"{'none' if row is None else row}",
+        ),
+        error=ScheduleError,
+    )
 
 
 def _design_order(

@@ -10,6 +10,7 @@ from dataclasses import asdict, replace
 from datetime import datetime
 from typing import ClassVar
 
+from masrel._input import refuse
 from masrel.errors import ParameterError, ProtocolError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
 from masrel.lab._study_files import Fact
@@ -119,17 +120,20 @@ def train_rater(
 def _check_models(study: StudyPaths, protocol: Protocol, rater: str) -> None:
     check_rater(protocol, rater)
     criterion = training_criterion(protocol)
-    if len(set(criterion.intended)) < 2:
-        raise ProtocolError(
+    refuse(
+        (
+            len(set(criterion.intended)) < 2,
             f"{study.protocol}: models: training needs two or more different intended "
-            f"grades, got {len(set(criterion.intended))}"
-        )
-    if criterion.window < criterion.n_models:
-        raise ProtocolError(
+            f"grades, got {len(set(criterion.intended))}",
+        ),
+        (
+            criterion.window < criterion.n_models,
             f"{study.protocol}: training.window: needed at least one presentation of "
             f"each of the {criterion.n_models} models with an intended grade, got "
-            f"{criterion.window}"
-        )
+            f"{criterion.window}",
+        ),
+        error=ProtocolError,
+    )
 
 
 class _Trainer(Presenter):

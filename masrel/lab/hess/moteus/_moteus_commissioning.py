@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
-from masrel.lab.hess._can import Link
+from masrel.errors import DeviceTimeoutError
+from masrel.lab.hess._can import Link, check_elbow_angle
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._free_arm import (
     Check,
@@ -195,11 +195,11 @@ def _fall_silent(servo: Servo, options: MoteusOptions) -> None:
     servo.wait(2e-3 * options.watchdog_ms)
     servo.ask()
     silent = servo.answer().mode
-    if (driven, silent) != (DRIVEN, TIMEOUT):
-        raise DeviceError(
-            f"{servo.name}: needs mode {DRIVEN} under torque and {TIMEOUT} after "
-            f"silence, got {driven} and {silent}"
-        )
+    servo.needs(
+        (driven, silent) == (DRIVEN, TIMEOUT),
+        f"mode {DRIVEN} under torque and {TIMEOUT} after silence, got {driven} and "
+        f"{silent}",
+    )
 
 
 def zero(link: Link, clock: Clock, options: MoteusOptions, *, angle: float) -> float:
@@ -228,17 +228,16 @@ def zero(link: Link, clock: Clock, options: MoteusOptions, *, angle: float) -> f
     DeviceError
         If it does not answer, or does not take the position.
     """
-    if not 0.0 <= angle <= math.pi:
-        raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
+    check_elbow_angle(angle)
     servo = Servo(link, clock, options)
     servo.stop()  # its position is about to jump
     servo.ask(write(FLOAT, SET_POSITION, options.position(angle)))
     servo.answer()  # from before
     servo.ask()
     position = servo.answer().position
-    if abs(options.angle(position) - angle) > _TOLERANCE:
-        raise DeviceError(
-            f"{servo.name}: needs a position of {options.position(angle):.5f} turns "
-            f"after zeroing, got {position:.5f}"
-        )
+    servo.needs(
+        abs(options.angle(position) - angle) <= _TOLERANCE,
+        f"a position of {options.position(angle):.5f} turns after zeroing, got "
+        f"{position:.5f}",
+    )
     return position

@@ -149,8 +149,7 @@ class Servo(Node):
     def answer(self, patience_s: float = _PATIENCE_S) -> State:
         """Return the answer to the last question, which may be waiting already."""
         self.is_asked = False
-        deadline_ns = self.asked_ns + round(patience_s * 1e9)
-        self._wait_until(self._is_current, deadline_ns, "no answer")
+        self._await(self._is_current, self.asked_ns, patience_s, "no answer")
         answer, self._answer = self._answer, {}
         if math.isnan(answer[POSITION]):
             raise FrameError(f"{self.name}: its position is not a number")
@@ -193,11 +192,11 @@ class Servo(Node):
     ) -> tuple[float, ...]:
         """Return registers."""
         self._answer = {}
-        sent_ns = self._send(Subframe(READ, kind, first, n))
         registers = range(first, first + n)
-        self._wait_until(
+        self._await(
             lambda: registers[-1] in self._answer,
-            sent_ns + round(patience_s * 1e9),
+            self._send(Subframe(READ, kind, first, n)),
+            patience_s,
             f"no answer for register {first:#05x}",
         )
         return tuple(self._answer.pop(register) for register in registers)
@@ -224,12 +223,6 @@ class Servo(Node):
     def _send(self, *subframes: Subframe, wants_answer: bool = True) -> int:
         identifier = self._options.servo + (_ANSWERED if wants_answer else 0)
         return self.link.send(Frame(identifier, encode(subframes)))
-
-    def _wait_until(
-        self, is_there: Callable[[], bool], deadline_ns: int, lacking: str
-    ) -> None:
-        if not self._receive_until(is_there, deadline_ns):
-            raise DeviceTimeoutError(f"{self.name}: {lacking} in time")
 
     def _sort(self, frame: Frame) -> None:
         if frame.identifier != self._options.servo << 8:
@@ -260,18 +253,17 @@ class ReadyServo(Servo):
         if state.code in FAULTS:
             raise stopped_itself(self, state.code)
         (home_state,) = self.get(INT8, HOME_STATE)
-        if home_state < OUTPUT_KNOWN:
-            raise DeviceError(
-                f"{self.name}: does not know where its output is (home state "
-                f"{home_state:.0f}); hold the arm at a known angle and run masrel "
-                "device zero"
-            )
+        self.needs(
+            home_state >= OUTPUT_KNOWN,
+            f"to know where its output is, got home state {home_state:.0f}; hold the "
+            "arm at a known angle and run masrel device zero",
+        )
         timeout_mode = self.setting("servo.timeout_mode")
-        if timeout_mode != FREE:
-            raise DeviceError(
-                f"{self.name}: needs servo.timeout_mode {FREE}, which lets the arm go "
-                f"after silence, got {timeout_mode:g}"
-            )
+        self.needs(
+            timeout_mode == FREE,
+            f"servo.timeout_mode {FREE}, which lets the arm go after silence, got "
+            f"{timeout_mode:g}",
+        )
         self.bounds = _bounds(self, options)
         check_angle(self.name, options.angle(state.position))
 
@@ -280,11 +272,11 @@ def _bounds(servo: Servo, options: MoteusOptions) -> tuple[float, float]:
     # The least and the largest angle that it lets the arm have, rad
     ends = [servo.setting(f"servopos.position_{end}") for end in ("min", "max")]
     low, high = sorted(map(options.angle, ends))
-    if not -math.pi < low < high < math.tau:
-        raise DeviceError(
-            f"{servo.name}: needs servopos.position_min and servopos.position_max a "
-            f"little beyond the arm's stops, got {ends[0]:g} and {ends[1]:g} turns"
-        )
+    servo.needs(
+        -math.pi < low < high < math.tau,
+        "servopos.position_min and servopos.position_max a little beyond the arm's "
+        f"stops, got {ends[0]:g} and {ends[1]:g} turns",
+    )
     return low, high
 
 

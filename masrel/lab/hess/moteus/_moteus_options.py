@@ -2,10 +2,10 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
-from masrel.errors import ParameterError
-from masrel.lab.hess._can import BusOptions, check_direction
+from masrel._input import refuse
+from masrel.lab.hess._can import BusOptions
 from masrel.lab.hess._emulated import InjectedFault
 from masrel.lab.hess._simulated import PlantParameters
 from masrel.lab.hess.device import _NOT_A_KEY
@@ -127,31 +127,26 @@ class MoteusOptions(BusOptions):
     is_fd: ClassVar[bool] = True
 
     servo: int = 1
-    direction: Literal[1, -1] = 1
-    gear_ratio: float = 1.0
     zero_rev: float = 0.0
     largest_torque_nm: float = 20.0
     watchdog_ms: float = 20.0
-    patience_s: float = 0.001
     estimates_torque: bool = False
     emulator: MoteusEmulatorOptions | None = field(default=None, metadata=_NOT_A_KEY)
 
     def __post_init__(self) -> None:
-        if not 1 <= self.servo <= 127:
-            raise ParameterError(f"servo: needs 1 to 127, got {self.servo}")
-        _check_positive(
-            gear_ratio=self.gear_ratio,
-            largest_torque_nm=self.largest_torque_nm,
-            patience_s=self.patience_s,
-        )
-        check_direction(self.direction)
-        if not math.isfinite(self.zero_rev):
-            raise ParameterError(f"zero_rev: needs to be finite, got {self.zero_rev}")
-        if not 2.0 <= self.watchdog_ms <= 100.0:
-            raise ParameterError(
-                f"watchdog_ms: needs 2 to 100 ms, got {self.watchdog_ms:g}"
-            )
         BusOptions.__post_init__(self)
+        _check_positive(largest_torque_nm=self.largest_torque_nm)
+        refuse(
+            (not 1 <= self.servo <= 127, f"servo: needs 1 to 127, got {self.servo}"),
+            (
+                not math.isfinite(self.zero_rev),
+                f"zero_rev: needs to be finite, got {self.zero_rev}",
+            ),
+            (
+                not 2.0 <= self.watchdog_ms <= 100.0,
+                f"watchdog_ms: needs 2 to 100 ms, got {self.watchdog_ms:g}",
+            ),
+        )
 
     def emulated(self, start: float) -> Self:  # noqa: ARG002 - it knows where its arm is
         """Return the same for an emulated moteus.

@@ -17,9 +17,16 @@ from masrel.errors import (
     FrameError,
     IdledError,
     LimitExceededError,
-    ParameterError,
 )
-from masrel.lab.hess._can import CanDevice, Frame, Link, Node, check_angle, options_of
+from masrel.lab.hess._can import (
+    CanDevice,
+    Frame,
+    Link,
+    Node,
+    check_angle,
+    check_elbow_angle,
+    options_of,
+)
 from masrel.lab.hess._clock import Clock, RealClock
 from masrel.lab.hess.device import DeviceSetup, Reading
 from masrel.lab.hess.puck._bus import (
@@ -92,13 +99,12 @@ class PuckNode(Node):
         """Request a property, wait for the reply, and return its value."""
         self.receive_waiting()
         self.values.pop(number, None)
-        request_ns = self.request(number)
-        deadline_ns = request_ns + round(patience_s * 1e9)
-        if not self._receive_until(lambda: number in self.values, deadline_ns):
-            raise DeviceTimeoutError(
-                f"puck {self.puck}: no answer for property {number} within "
-                f"{patience_s * 1e3:g} ms"
-            )
+        self._await(
+            lambda: number in self.values,
+            self.request(number),
+            patience_s,
+            f"no answer for property {number}",
+        )
         return self.values.pop(number)
 
     def position(self, number: int, *, patience_s: float) -> tuple[int, int]:
@@ -159,10 +165,7 @@ class AwakePuck:
     ) -> None:
         self.node = node = PuckNode(link, clock, options.puck)
         status = node.get(STATUS)
-        if status not in (ASLEEP, READY):
-            raise DeviceError(
-                f"puck {node.puck}: needs STAT 0 or 2, it reports {status}"
-            )
+        node.needs(status in (ASLEEP, READY), f"STAT 0 or 2, it reports {status}")
         firmware, role = node.get(VERSION), node.get(ROLE)
         self.table = table = motor_table(node.puck, role, firmware, options.properties)
         self.torque_id, self.mode_id = table.number("T"), table.number("MODE")
@@ -185,10 +188,7 @@ class AwakePuck:
         node.set(STATUS, READY)
         node.wait(_OFF_BUS_S)
         status = node.get(STATUS)
-        if status != READY:
-            raise DeviceError(
-                f"puck {node.puck}: needs STAT {READY} after waking, got {status}"
-            )
+        node.needs(status == READY, f"STAT {READY} after waking, got {status}")
 
     def _configure(self, options: PuckOptions) -> None:
         # It may still hold the torque of a driver that was killed.
@@ -201,20 +201,19 @@ class AwakePuck:
         self.transmission = self._read_transmission(options)  # what it counts in
         largest = options.largest_torque
         self.max_units = math.floor(largest / self.transmission.torque_step)
-        if not 0 < self.max_units <= MAX_TORQUE:
-            raise DeviceError(
-                f"puck {self.node.puck}: largest_torque needs 1 to {MAX_TORQUE} "
-                f"current units, {largest:g} N·m are {self.max_units}"
-            )
+        self.node.needs(
+            0 < self.max_units <= MAX_TORQUE,
+            f"a largest_torque of 1 to {MAX_TORQUE} current units, {largest:g} N·m are "
+            f"{self.max_units}",
+        )
         self._set("MT", self.max_units)
 
     def _read_transmission(self, options: PuckOptions) -> Transmission:
         counts, units = self._get("CTS"), self._get("IPNM")
-        if counts < 1 or units < 1:
-            raise DeviceError(
-                f"puck {self.node.puck}: needs CTS and IPNM above 0, got {counts} "
-                f"and {units}"
-            )
+        self.node.needs(
+            counts >= 1 and units >= 1,
+            f"CTS and IPNM above 0, got {counts} and {units}",
+        )
         return Transmission(
             counts_per_turn=counts,
             units_per_nm=units,
@@ -229,30 +228,23 @@ class AwakePuck:
         # A setting is not acknowledged: it is read back.
         self.node.set(self.table.settable(name), value)
         actual = self._get(name)
-        if actual != value:
-            raise DeviceError(
-                f"puck {self.node.puck}: {name} needs {value}, reads {actual}"
-            )
+        self.node.needs(actual == value, f"{name} {value}, reads {actual}")
 
     def set_position(self, angle: float) -> int:
         """Set the position of an idle puck, and return the count that it reports."""
         node = self.node
-        if not 0.0 <= angle <= math.pi:
-            raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
+        check_elbow_angle(angle)
         mode = self._get("MODE")
-        if mode != IDLE:  # its position is about to jump
-            raise DeviceError(
-                f"puck {node.puck}: needs MODE {IDLE} to be zeroed, is {mode}"
-            )
+        # its position is about to jump
+        node.needs(mode == IDLE, f"MODE {IDLE} to be zeroed, is {mode}")
         target = self.transmission.counts(angle)
         node.set(self.table.settable("P"), target)
         node.wait(_SETTING_TIME_S)
         _, counts = node.position(self.position_id, patience_s=0.05)
-        if abs(counts - target) > _COUNT_TOLERANCE:
-            raise DeviceError(
-                f"puck {node.puck}: needs a position of {target} counts after zeroing, "
-                f"got {counts}"
-            )
+        node.needs(
+            abs(counts - target) <= _COUNT_TOLERANCE,
+            f"a position of {target} counts after zeroing, got {counts}",
+        )
         return counts
 
     def activate(self, *, checks_torque: bool) -> None:
@@ -261,22 +253,22 @@ class AwakePuck:
         self._set("T", 0)
         node.set(table.settable("MODE"), TORQUE)
         mode = self._get("MODE")
-        if mode != TORQUE:  # on a whole arm its safety module decides
-            raise DeviceError(
-                f"puck {node.puck}: needs MODE {TORQUE}, stays in {mode}; is an "
-                "emergency stop pressed, or does a safety module want to be activated?"
-            )
+        node.needs(  # on a whole arm its safety module decides
+            mode == TORQUE,
+            f"MODE {TORQUE}, stays in {mode}; is an emergency stop pressed, or does a "
+            "safety module want to be activated?",
+        )
         if not checks_torque:
             return
         # One current unit is 0.007 N·m, less than friction holds.
         node.set(table.settable("T"), 1)
         torque = self._get("T")
         self._set("T", 0)
-        if torque != 1:  # then lost torques could not be noticed
-            raise DeviceError(
-                f"puck {node.puck}: needs a property T that reads back as it was set, "
-                f"set to 1 it reads {torque}; checks_torque = false skips this check"
-            )
+        node.needs(  # or lost torques could not be noticed
+            torque == 1,
+            "a property T that reads back as it was set, set to 1 it reads "
+            f"{torque}; checks_torque = false skips this check",
+        )
 
     def release(self) -> None:
         """Zero the torque and idle it, until it confirms."""
@@ -349,16 +341,13 @@ class PuckDevice(CanDevice[PuckOptions]):
         self._node = puck.node
         if puck.was_asleep and angle is not None:
             puck.set_position(angle)
-        self._check_angle()
+        _, counts = puck.node.position(puck.position_id, patience_s=0.05)
+        check_angle(puck.node.name, puck.transmission.angle(counts))
         try:
             puck.activate(checks_torque=self._options.checks_torque)
         except BaseException:
             puck.release()
             raise
-
-    def _check_angle(self) -> None:
-        _, counts = self._node.position(self._puck.position_id, patience_s=0.05)
-        check_angle(self._node.name, self._puck.transmission.angle(counts))
 
     def _read(self) -> Reading:
         puck, values = self._puck, self._node.values

@@ -11,6 +11,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
+import msgspec
+
+from masrel._input import refuse
 from masrel.errors import DeviceError, ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
 from masrel.lab.hess._can import BusOptions, check_direction
@@ -98,15 +101,19 @@ class PropertyTable:
 
     def __post_init__(self) -> None:
         absent = [name for name in REQUIRED if name not in self.numbers]
-        if absent:
-            raise ParameterError(f"properties: need {', '.join(absent)} too")
+        refuse(
+            (absent, f"properties: need {', '.join(absent)} too"),
+            *(
+                (
+                    not _LOWEST <= number <= _HIGHEST,
+                    f"properties.{name}: needs {_LOWEST} to {_HIGHEST}, got {number}; "
+                    "0 to 7 are the same for every firmware",
+                )
+                for name, number in self.numbers.items()
+            ),
+        )
         taken: dict[int, str] = {}
         for name, number in self.numbers.items():
-            if not _LOWEST <= number <= _HIGHEST:
-                raise ParameterError(
-                    f"properties.{name}: needs {_LOWEST} to {_HIGHEST}, got {number}; "
-                    "0 to 7 are the same for every firmware"
-                )
             for used in (number, number + 1) if name in _WIDE else (number,):
                 if used in taken:
                     raise ParameterError(
@@ -197,6 +204,12 @@ def property_table(firmware: int) -> PropertyTable:
     return PropertyTable(numbers={**_MODERN, "EN": enable, "HOLD": hold})
 
 
+class _PropertyFile(msgspec.Struct, forbid_unknown_fields=True):
+    """A file of property numbers."""
+
+    properties: dict[str, int]
+
+
 def read_property_table(path: Path) -> PropertyTable:
     """Read the property numbers of a firmware that the driver does not know.
 
@@ -219,20 +232,12 @@ def read_property_table(path: Path) -> PropertyTable:
     """
     try:
         document = parse_toml(read_regular(path, most=MAX_SMALL))
-    except ValueError as error:
-        raise ParameterError(f"{path}: not TOML ({error})") from error
-    if set(document) != {"properties"} or not isinstance(document["properties"], dict):
-        raise ParameterError(f"{path}: needs one table, [properties]")
-    numbers = document["properties"]
-    for name, number in numbers.items():
-        if type(number) is not int:
-            raise ParameterError(
-                f"{path}: properties.{name}: needs a whole number, got {number!r}"
-            )
-    try:
-        return PropertyTable(numbers=numbers)
-    except ParameterError as error:
-        raise ParameterError(f"{path}: {error}") from error
+        file = msgspec.convert(document, _PropertyFile)
+        return PropertyTable(numbers=file.properties)
+    except (ValueError, msgspec.ValidationError) as error:
+        raise ParameterError(
+            f"{path}: needs one table, [properties], of whole numbers: {error}"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -382,31 +387,26 @@ class PuckOptions(BusOptions):
 
     puck: int = 1
     gear_ratio: float = GEAR_RATIO
-    direction: Literal[1, -1] = 1
     largest_torque: float = 28.0
-    patience_s: float = 0.001
     checks_torque: bool = True
     angle_after_reset: float | None = field(default=None, metadata=_NOT_A_KEY)
     properties: PropertyTable | None = field(default=None, repr=False)
     emulator: EmulatorOptions | None = field(default=None, metadata=_NOT_A_KEY)
 
     def __post_init__(self) -> None:
-        if not 1 <= self.puck <= _MAX_MOTOR_NODE:
-            raise ParameterError(
-                f"puck: needs a motor's node, 1 to {_MAX_MOTOR_NODE}, got {self.puck}"
-            )
-        _check_positive(
-            gear_ratio=self.gear_ratio,
-            largest_torque=self.largest_torque,
-            patience_s=self.patience_s,
-        )
-        check_direction(self.direction)
-        angle = self.angle_after_reset
-        if angle is not None and not 0.0 <= angle <= math.pi:
-            raise ParameterError(
-                f"angle_after_reset: needs 0 to 180 degrees, got {angle} rad"
-            )
         BusOptions.__post_init__(self)
+        _check_positive(largest_torque=self.largest_torque)
+        angle = self.angle_after_reset
+        refuse(
+            (
+                not 1 <= self.puck <= _MAX_MOTOR_NODE,
+                f"puck: needs a motor's node, 1 to {_MAX_MOTOR_NODE}, got {self.puck}",
+            ),
+            (
+                angle is not None and not 0.0 <= angle <= math.pi,
+                f"angle_after_reset: needs 0 to 180 degrees, got {angle} rad",
+            ),
+        )
 
     def emulated(self, start: float) -> Self:
         """Return the same for an emulated puck of this gear, direction and firmware.

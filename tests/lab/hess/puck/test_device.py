@@ -108,8 +108,8 @@ def test_a_driver_that_was_killed_leaves_no_torque_to_the_next() -> None:
             "needs firmware 65 to 113, or 119 or later, got 116",
         ),
         ({"wake_s": 1.5}, {}, "puck 1: no answer for property 5"),
-        ({}, {"largest_torque": 60.0}, "largest_torque needs 1 to 8191 current units"),
-        ({}, {"largest_torque": 0.001}, "largest_torque needs 1 to 8191 current units"),
+        ({}, {"largest_torque": 60.0}, "needs a largest_torque of 1 to 8191 current"),
+        ({}, {"largest_torque": 0.001}, "needs a largest_torque of 1 to 8191 current"),
         (
             {"awake": True},
             {"gear_ratio": 8.0, "largest_torque": 9.0},
@@ -208,8 +208,8 @@ def zeroed(
         ({STAT: [0]}, None, "puck 1: needs STAT 2 after waking, got 0"),
         ({CTS: [0]}, None, "puck 1: needs CTS and IPNM above 0, got 0 and 2700"),
         ({IPNM: [-3]}, None, "puck 1: needs CTS and IPNM above 0, got 4096 and -3"),
-        ({GRPA: [9]}, None, "puck 1: GRPA needs 0, reads 9"),
-        ({MODE: [3]}, None, "puck 1: MODE needs 0, reads 3"),
+        ({GRPA: [9]}, None, "puck 1: needs GRPA 0, reads 9"),
+        ({MODE: [3]}, None, "puck 1: needs MODE 0, reads 3"),
         # under torque
         ({MODE: [0, 2]}, None, "needs MODE 0 to be zeroed, is 2"),
         ({}, 19248, "needs a position of 19251 counts after zeroing, got 19248"),
