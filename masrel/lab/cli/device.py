@@ -54,11 +54,13 @@ from masrel.lab.hess._calibration import (
     N_STEPS,
     GainPoint,
     carry,
+    compare_models,
     fit_gain,
+    lateness_ms,
     measure_free_arm,
+    rendered,
 )
 from masrel.lab.hess._can import Link
-from masrel.lab.hess._fidelity import compare_models, lateness_ms, rendered
 from masrel.lab.hess._free_arm import LIMITS, SPEEDS, fit_friction, steady_runs
 from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
 from masrel.lab.hess.device import _BACKENDS as _OWN

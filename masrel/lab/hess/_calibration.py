@@ -1,14 +1,15 @@
 """What a device is like, measured on it: noise, friction, inertia, delay, gain.
 
 In: an open device whose arm is free, or bears weights that are known or that a torque
-sensor reads. Out: numbers with intervals of 95 %.
+sensor reads. Out: numbers with intervals of 95 %. Of recordings: how near the torque
+that a device gives comes to the one that is asked for, and how late ticks are.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,12 @@ from masrel.lab.hess._free_arm import (
 )
 from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
-from masrel.lab.recording import _TORQUE_GAINS
+from masrel.lab.recording import (
+    _TORQUE_GAINS,
+    ESTIMATED_TORQUE,
+    MEASURED_TORQUE,
+    Recording,
+)
 
 _REST_S = 2.0
 
@@ -241,3 +247,78 @@ def fit_gain(points: Sequence[GainPoint]) -> dict[str, Measured]:
         "torque_gain": gain,
         "torque_offset_nm": _measured(offset, offset_error, df),
     }
+
+
+# How near a torque comes to the one that is asked for
+
+# Which torque is rendered, and which it is compared with. A sensor between motor and
+# arm reads what the hand feels but for the arm; a board's own estimate is of its motor.
+_COMPARED = {
+    MEASURED_TORQUE: "model_torque_nm",
+    ESTIMATED_TORQUE: "command_torque_nm",
+}
+_LATE_S = (-0.005, 0.05)
+
+
+def rendered(recording: Recording) -> dict[str, float]:
+    """Compare the torque of a stretch with the one that was asked for.
+
+    Nothing is known of a device that neither measures nor estimates its torque.
+    """
+    channel = next((each for each in _COMPARED if each in recording.channels), None)
+    if channel is None:
+        return {}
+    columns = {n: c[: recording.n_presented] for n, c in recording.columns.items()}
+    time, felt = columns["time_s"], columns[channel.column]
+    goal = columns[_COMPARED[channel]]
+    difference = felt - goal
+    velocity = np.radians(columns["velocity_deg_s"])
+    friction = np.column_stack(
+        [velocity, np.sign(velocity), np.gradient(velocity, time)]
+    )
+    rows = np.isfinite(felt)
+
+    def square(delay: float) -> float:
+        # What neither the torque sent so much earlier nor (7) explains
+        sent = np.interp(time - delay, time, columns["command_torque_nm"])
+        left = (felt - sent)[rows]
+        moved = np.linalg.lstsq(friction[rows], left, rcond=None)[0]
+        return float(np.sum((left - friction[rows] @ moved) ** 2))
+
+    best = minimize_scalar(square, bounds=_LATE_S, method="bounded")
+    return {
+        "rmse_nm": math.sqrt(float(np.nanmean(difference**2))),
+        "max_nm": float(np.nanmax(np.abs(difference))),
+        "delay_ms": 1e3 * float(best.x),
+        "peak_nm": float(np.abs(goal).max()),
+    }
+
+
+def compare_models(
+    stretches: Sequence[Mapping[str, Any]],
+) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Return what the stretches of each model say together, and that in lines."""
+    models: dict[str, dict[str, Any]] = {}
+    lines = []
+    for model in dict.fromkeys(each["model"] for each in stretches):
+        of = [each for each in stretches if each["model"] == model and len(each) > 2]
+        if not of:
+            return {}, ["torque: the device neither measures nor estimates it"]
+        rmse, delay = (mean_of([e[key] for e in of]) for key in ("rmse_nm", "delay_ms"))
+        largest = max(each["max_nm"] for each in of)
+        percent = 100.0 * rmse.value / max(each["peak_nm"] for each in of)
+        models[model] = {"rmse_nm": rmse, "max_nm": largest, "percent_of_peak": percent}
+        models[model]["delay_ms"] = delay
+        lines.append(
+            f"{model}: RMSE {rmse.value:.3f} [{rmse.low:.3f}, {rmse.high:.3f}] N·m, "
+            f"{percent:.1f} % of the peak; at most {largest:.2f} N·m; "
+            f"{delay.value:.2f} [{delay.low:.2f}, {delay.high:.2f}] ms late"
+        )
+    return models, lines
+
+
+def lateness_ms(recordings: Sequence[Recording], rate_hz: int) -> NDArray[np.float64]:
+    """Return how late each tick was, beside the promptest of its recording, ms."""
+    times_ns = (np.rint(1e9 * each.columns["time_s"]) for each in recordings)
+    late_ns = [np.mod(each, 1e9 / rate_hz) for each in times_ns]
+    return 1e-6 * np.concatenate([each - each.min() for each in late_ns])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from masrel.lab.hess import PlantParameters, SimulatedOptions, TorqueSensor
-from masrel.lab.hess._fidelity import compare_models, lateness_ms, rendered
+from masrel.lab.hess._calibration import compare_models, lateness_ms, rendered
 from masrel.lab.recording import ESTIMATED_TORQUE, RECORDING_COLUMNS, Recording
 
 from .rig import present
