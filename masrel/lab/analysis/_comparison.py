@@ -104,13 +104,17 @@ def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]
     """Read the analysis of a report's folder, of a study, or of a file of its own."""
     within = (place / "analysis.json", place / "report" / "analysis.json")
     file = next((p for p in within if p.is_file()), place)
-    if file.is_dir() or not file.exists():
-        raise ParameterError(
+    refuse(
+        (
+            file.is_dir() or not file.exists(),
             f"{option}: needs an analysis.json, or a folder that has one, as that of a "
-            f"report or a study, got {place}"
-        )
-    if is_cut_off(file.parent):
-        raise ParameterError(f"{option}: {file.parent}: {CUT_OFF}")
+            f"report or a study, got {place}",
+        ),
+        (
+            is_cut_off(file.parent),
+            f"{option}: {file.parent}: {CUT_OFF}",
+        ),
+    )
     try:
         document = parse_json(read_regular(file, most=MAX_TABLE))
     except ValueError as error:

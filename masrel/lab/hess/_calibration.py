@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.special import stdtrit
 
-from masrel._input import refuse
 from masrel.errors import DeviceError
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._free_arm import (
@@ -222,27 +221,21 @@ def fit_gain(points: Sequence[GainPoint]) -> dict[str, Measured]:
     against, sent, direction = np.array(points).T
     design = np.column_stack([against, np.ones(len(points)), direction])
     df = len(points) - 3
-    refuse(
-        (
-            df < 1 or np.linalg.matrix_rank(design) < 3,
+    if df < 1 or np.linalg.matrix_rank(design) < 3:
+        raise DeviceError(
             "gain: needs weights of two masses or more, each way, got "
-            f"{len(set(against.tolist()))} torques",
-        ),
-        error=DeviceError,
-    )
+            f"{len(set(against.tolist()))} torques"
+        )
     (slope, offset, _), (error, offset_error, _) = linear_fit(design, sent)
     share = _measured(slope, error, df)
     gain = Measured(1.0 / slope, 1.0 / share.high, 1.0 / share.low)
     least, most = _TORQUE_GAINS
-    refuse(
-        (
-            not least <= gain.value <= most,
+    if not least <= gain.value <= most:
+        raise DeviceError(
             f"gain: needs a torque of {least:g} to {most:g} times the one that "
             f"is sent, got {gain.value:.3f} times ({gain.low:.3f} to {gain.high:.3f}); "
-            "correct the motor's torque constant, the gear or the direction",
-        ),
-        error=DeviceError,
-    )
+            "correct the motor's torque constant, the gear or the direction"
+        )
     return {
         "torque_gain": gain,
         "torque_offset_nm": _measured(offset, offset_error, df),

@@ -28,6 +28,7 @@ from masrel.errors import (
     DeviceError,
     DeviceTimeoutError,
     FrameError,
+    ParameterError,
 )
 from masrel.lab.hess._clock import Clock, SimulatedClock
 from masrel.lab.hess.device import (
@@ -269,13 +270,11 @@ class BusOptions(BackendOptions, ABC):
     def __post_init__(self) -> None:
         _check_positive(gear_ratio=self.gear_ratio, patience_s=self.patience_s)
         check_direction(self.direction)
-        refuse(
-            (
-                self.emulator is not None and self.interface != "virtual",
+        if self.emulator is not None and self.interface != "virtual":
+            raise ParameterError(
                 f"interface: needs 'virtual' for an emulated {self.name}, "
-                f"got {self.interface!r}",
+                f"got {self.interface!r}"
             )
-        )
 
     @abstractmethod
     def emulated(self, start: float) -> Self:
@@ -404,7 +403,8 @@ class Node(ABC):
 
     def needs(self, holds: bool, what: str) -> None:
         """Refuse an amplifier that is not as it must be; what it must be, and is."""
-        refuse((not holds, f"{self.name}: needs {what}"), error=DeviceError)
+        if not holds:
+            raise DeviceError(f"{self.name}: needs {what}")
 
     def _await(
         self, is_there: Callable[[], bool], since_ns: int, patience_s: float, what: str
@@ -522,26 +522,20 @@ class CanDevice(Device, Generic[_Options]):
 def check_angle(name: str, angle: float) -> None:
     """Refuse an arm that is where no elbow can be."""
     limits = DeviceLimits()
-    refuse(
-        (
-            not limits.lowest_angle <= angle <= limits.highest_angle,
+    if not limits.lowest_angle <= angle <= limits.highest_angle:
+        raise DeviceError(
             f"{name}: needs an arm between -5 and 185 deg, it reports "
-            f"{math.degrees(angle):.1f}; run masrel device zero",
-        ),
-        error=DeviceError,
-    )
+            f"{math.degrees(angle):.1f}; run masrel device zero"
+        )
 
 
 def check_elbow_angle(angle: float) -> None:
     """Refuse an angle, rad, that no arm can be held at while it is zeroed."""
-    refuse(
-        (
-            not 0.0 <= angle <= math.pi,
-            f"angle: needs 0 to 180 degrees, got {angle} rad",
-        )
-    )
+    if not 0.0 <= angle <= math.pi:
+        raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
 
 
 def check_direction(direction: int) -> None:
     """Refuse a direction that is neither with nor against extension."""
-    refuse((direction not in (1, -1), f"direction: needs 1 or -1, got {direction}"))
+    if direction not in (1, -1):
+        raise ParameterError(f"direction: needs 1 or -1, got {direction}")

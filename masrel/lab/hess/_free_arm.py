@@ -14,8 +14,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import refuse
-from masrel.errors import DeviceError, DeviceTimeoutError
+from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
 from masrel.lab.hess._can import Node
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._guard import Guard
@@ -302,13 +301,11 @@ def fit_friction(
     torques = np.array([run.torque - inertia * run.acceleration for run in runs])
     # (7) at a steady speed: τ = B θ̇ + β sgn(θ̇), and what acts one way
     design = np.column_stack([speeds, np.sign(speeds), np.ones(len(runs))])
-    refuse(
-        (
-            len(runs) < 4 or np.linalg.matrix_rank(design) < 3,
+    if len(runs) < 4 or np.linalg.matrix_rank(design) < 3:
+        raise ParameterError(
             "runs: need four or more, at two speeds and in both directions, "
-            f"got {len(runs)}",
+            f"got {len(runs)}"
         )
-    )
     (viscous, coulomb, offset), errors = linear_fit(design, torques)
     viscous_error, coulomb_error, offset_error = errors
     return FrictionEstimate(
@@ -359,28 +356,22 @@ class TurningArm:
         while math.isnan(self.angle):
             self._tick(0.0)
         start, start_ns = self.angle, self._clock.now_ns()
-        refuse(
-            (
-                not _LOW_END - _MARGIN <= start <= _HIGH_END + _MARGIN,
+        if not _LOW_END - _MARGIN <= start <= _HIGH_END + _MARGIN:
+            raise DeviceError(
                 "friction: needs an arm between 30 and 125 deg to begin with, it is at "
-                f"{math.degrees(start):.1f}",
-            ),
-            error=DeviceError,
-        )
+                f"{math.degrees(start):.1f}"
+            )
         while abs(self.angle - start) < _PROBE_TRAVEL:
             if self._clock.now_ns() - start_ns > _PROBE_S * 1e9:
                 raise DeviceError(
                     f"friction: needs a free arm, {_PROBE_TORQUE:g} N·m do not move it"
                 )
             self._tick(_PROBE_TORQUE)
-        refuse(
-            (
-                self.angle < start,
+        if self.angle < start:
+            raise DeviceError(
                 "friction: needs an arm that a torque towards extension extends, it "
-                "flexes; torque and counts have different signs",
-            ),
-            error=DeviceError,
-        )
+                "flexes; torque and counts have different signs"
+            )
 
     def steady_runs(
         self, speeds: Sequence[float], progress: Callable[[], object]

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import refuse
-from masrel.errors import DeviceError
+from masrel.errors import DeviceError, ParameterError
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess.controller import Friction
 from masrel.lab.hess.device import (
@@ -82,13 +81,11 @@ class PlantParameters:
     step_ns: int = 500_000
 
     def __post_init__(self) -> None:
-        refuse(
-            (
-                not 0.0 < self.range_end <= math.pi,
+        if not 0.0 < self.range_end <= math.pi:
+            raise ParameterError(
                 "range_end: needs more than 0 and at most 180 degrees, "
-                f"got {self.range_end} rad",
+                f"got {self.range_end} rad"
             )
-        )
         _check_not_negative(
             arm_inertia=self.arm_inertia,
             torque_step=self.torque_step,
@@ -151,13 +148,11 @@ class Plant:
     # II and equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
 
     def __init__(self, hand: Hand, parameters: PlantParameters) -> None:
-        refuse(
-            (
-                not 0.0 <= hand.start < parameters.range_end,
+        if not 0.0 <= hand.start < parameters.range_end:
+            raise ParameterError(
                 "range_end: needs an angle beyond the start of the stretch, got "
-                f"{parameters.range_end} rad with a start at {hand.start} rad",
+                f"{parameters.range_end} rad with a start at {hand.start} rad"
             )
-        )
         friction = parameters.friction
         self._hand, self._arm = hand, parameters
         self._yields = hand.yields

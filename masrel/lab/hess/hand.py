@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from masrel._input import refuse
+from masrel.errors import ParameterError
 from masrel.lab.hess.limits import _check_not_negative, _check_positive
 
 # All of these are our choice: how gently the intended speed rises and falls, s; what
@@ -77,12 +77,8 @@ class Hand(ABC):
         slip_time: float | None,
     ) -> None:
         _check_positive(stiffness=stiffness, damping=damping)
-        refuse(
-            (
-                slip_time is not None and not slip_time >= 0.0,
-                f"slip_time: needs 0 or more, got {slip_time}",
-            )
-        )
+        if slip_time is not None and not slip_time >= 0.0:
+            raise ParameterError(f"slip_time: needs 0 or more, got {slip_time}")
         self.start = start
         self.stiffness = stiffness
         self.damping = damping
@@ -139,13 +135,11 @@ def _way(
     speed = math.copysign(speed, way)  # negative on the way back
     ramps = 0.5 * speed * (ramp_up + ramp_down)
     cruise = way - ramps
-    refuse(
-        (
-            cruise / speed <= 0.0,
+    if cruise / speed <= 0.0:
+        raise ParameterError(
             f"mean_speed: needs ramps shorter than the stretch, at {abs(speed)} "
-            f"rad/s they take {abs(ramps):.3g} of {abs(way):.3g} rad",
+            f"rad/s they take {abs(ramps):.3g} of {abs(way):.3g} rad"
         )
-    )
     cruise_s = leaves_s + ramp_up
     brake_s = cruise_s + cruise / speed
     rest_s = brake_s + ramp_down
@@ -241,13 +235,11 @@ class SimulatedHand(Hand):
         super().__init__(
             start=start, stiffness=stiffness, damping=damping, slip_time=slip_time
         )
-        refuse(
-            (
-                not 0.0 <= start < end <= math.pi,
+        if not 0.0 <= start < end <= math.pi:
+            raise ParameterError(
                 "start, end: need 0 <= start < end <= 180 degrees, "
-                f"got {start} and {end} rad",
+                f"got {start} and {end} rad"
             )
-        )
         self.end = end
         self.mean_speed = mean_speed
         final = end + follow_through

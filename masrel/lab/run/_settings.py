@@ -69,13 +69,11 @@ def check_backend(protocol: Protocol) -> None:
     device_limits(settings)
     backend_options(settings)
     is_asked_for = protocol.presentation.done_with == "button"
-    refuse(
-        (
-            is_asked_for and settings.backend not in _WITH_BUTTON,
+    if is_asked_for and settings.backend not in _WITH_BUTTON:
+        raise ParameterError(
             f"device.backend: needed one with a button ({', '.join(_WITH_BUTTON)}), "
-            f"as presentation.done_with asks for, got {settings.backend!r}",
+            f"as presentation.done_with asks for, got {settings.backend!r}"
         )
-    )
 
 
 def torque_problems(protocol: Protocol) -> Iterator[str]:

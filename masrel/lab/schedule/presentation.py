@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import masrel
-from masrel._input import not_utf8
+from masrel._input import not_utf8, refuse
 from masrel.errors import ScheduleError
 from masrel.lab._study_files import (
     MAX_SMALL,
@@ -263,15 +263,19 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
 def _require_place(protocol: Protocol, rater: str, session: str) -> None:
     """Refuse a rater and session the protocol does not bring together."""
     raters = {each.id: each.raters for each in protocol.sessions}
-    if session not in raters:
-        raise ScheduleError(
-            f"session: needed one of {', '.join(raters)}, got {session!r}"
-        )
-    if rater not in raters[session]:
-        raise ScheduleError(
-            f"rater: needed one of {', '.join(raters[session])} for session "
-            f"{session}, got {rater!r}"
-        )
+    of_session = raters.get(session, ())
+    refuse(
+        (
+            session not in raters,
+            f"session: needed one of {', '.join(raters)}, got {session!r}",
+        ),
+        (
+            rater not in of_session,
+            f"rater: needed one of {', '.join(of_session)} for session {session}, got "
+            f"{rater!r}",
+        ),
+        error=ScheduleError,
+    )
 
 
 # Version of the files of schedules and sheets; a file without one is of version 1

@@ -11,7 +11,7 @@ from itertools import chain, groupby, pairwise
 from pathlib import Path
 
 from masrel._files import make_folder, write_files
-from masrel._input import listed
+from masrel._input import listed, refuse
 from masrel.errors import ScheduleError
 from masrel.lab._study_files import MAX_SMALL, read_regular, sha256_of
 from masrel.lab.protocol import (
@@ -176,13 +176,17 @@ def _drawn_texts(
     to_draw: Sequence[_RaterSession],
     allot: Callable[[Sequence[_RaterSession]], Mapping[_RaterSession, int]] | None,
 ) -> dict[Path, str | bytes]:
-    if protocol.schedule.scheme in WITH_ROWS and allot is None:
-        raise ScheduleError(
+    problem = order_problem(protocol)
+    refuse(
+        (
+            protocol.schedule.scheme in WITH_ROWS and allot is None,
             f"allot: needed with scheme {protocol.schedule.scheme}, whose rows are "
-            "allotted by the study's log (masrel.lab.conduct.allot_schedules), got none"
-        )
-    if (problem := order_problem(protocol)) is not None:
-        raise ScheduleError(f"{study.protocol}: {problem}")
+            "allotted by the study's log (masrel.lab.conduct.allot_schedules), got "
+            "none",
+        ),
+        (problem is not None, f"{study.protocol}: {problem}"),
+        error=ScheduleError,
+    )
     key = find_secret(study)
     there = [*_read_drawn(study, protocol.rater_sessions, skips_damaged=True)]
     if key is not None:
