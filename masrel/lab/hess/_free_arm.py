@@ -26,6 +26,7 @@ from masrel.lab.recording import MEASURED_TORQUE
 
 # Before it turns
 
+PROBE_PATIENCE_S = 0.01  # with a node that may not be there; drivers wait 1 to 100 ms
 _N_REQUESTS = 1000
 _MAX_REPLY_S = 0.0007  # of a tick of 1 ms; the rest is for the torque and the host
 _MIN_FRACTION_IN_TIME = 0.99

@@ -11,6 +11,7 @@ from masrel.errors import DeviceTimeoutError
 from masrel.lab.hess._can import Link, check_elbow_angle
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._free_arm import (
+    PROBE_PATIENCE_S,
     Check,
     ask_often,
     check_bus,
@@ -32,7 +33,6 @@ from masrel.lab.hess.moteus._moteus_options import (
 )
 
 N_NODES = 127
-_PROBE_PATIENCE_S = 0.01
 _TICK_S = 0.001
 _STEP = math.radians(0.005)  # of the angle of an arm at rest
 _MOST_TICKS = 50  # from a stop to the torque mode; chosen
@@ -118,7 +118,7 @@ def probe(
 
 
 def _report(servo: Servo, number: int) -> ServoReport:
-    (version,) = servo.get(INT32, FIRMWARE, patience_s=_PROBE_PATIENCE_S)
+    (version,) = servo.get(INT32, FIRMWARE, patience_s=PROBE_PATIENCE_S)
     home_state, volts, celsius, code = servo.get(INT8, HOME_STATE, 4)
     serial = servo.get(INT32, SERIAL_NUMBER, 3)
     major, minor, micro = int(version).to_bytes(4, "big")[1:]

@@ -182,8 +182,7 @@ class MoteusEmulator(EmulatedAmplifier):
                 return
             self.mode = PREPARING[0]
             self._begin_faults(now_ns)
-            ready_ns = now_ns + _PREPARING_NS
-            self._at(ready_ns, lambda _due: self._ready())
+            self._at(now_ns + _PREPARING_NS, self._begin_torque)
         self._n_commands += 1
         number, watchdog_s = self._n_commands, written.get(WATCHDOG, 0.0) or 0.1
         if not math.isnan(watchdog_s):
@@ -196,7 +195,7 @@ class MoteusEmulator(EmulatedAmplifier):
             return
         self._turn(written, now_ns)
 
-    def _ready(self) -> None:
+    def _begin_torque(self, _now_ns: int) -> None:
         if self.mode in PREPARING:
             self.mode = DRIVEN
 

@@ -11,6 +11,7 @@ from masrel.errors import DeviceError, DeviceTimeoutError
 from masrel.lab.hess._can import Link
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._free_arm import (
+    PROBE_PATIENCE_S,
     Check,
     ask_often,
     check_bus,
@@ -35,7 +36,6 @@ from masrel.lab.hess.puck._puck_options import (
     PuckOptions,
 )
 
-_PROBE_PATIENCE_S = 0.01  # public drivers wait 1 and 100 ms
 _REPORTED = ("MODE", "CTS", "IPNM", "MT", "GRPA", "GRPB", "GRPC", "TEMP", "VBUS")
 _KINDS = {
     0: "motor",
@@ -132,7 +132,7 @@ def probe(
 
 def _node_report(node: PuckNode, properties: PropertyTable | None) -> NodeReport | None:
     try:
-        status = node.get(STATUS, patience_s=_PROBE_PATIENCE_S)
+        status = node.get(STATUS, patience_s=PROBE_PATIENCE_S)
         if status not in (ASLEEP, READY):
             return NodeReport(
                 puck=node.puck,
@@ -142,8 +142,8 @@ def _node_report(node: PuckNode, properties: PropertyTable | None) -> NodeReport
                 is_supported=False,
                 properties={},
             )
-        firmware = node.get(VERSION, patience_s=_PROBE_PATIENCE_S)
-        role = node.get(ROLE, patience_s=_PROBE_PATIENCE_S)
+        firmware = node.get(VERSION, patience_s=PROBE_PATIENCE_S)
+        role = node.get(ROLE, patience_s=PROBE_PATIENCE_S)
     except DeviceTimeoutError:
         return None
     try:

@@ -42,7 +42,7 @@ from masrel.lab.hess.puck._puck_options import (
 )
 
 _SETTING_NS = 110_000  # six bytes on the bus
-_SAMPLING_NS = 75_000  # from a request to the sample
+SAMPLING_NS = 75_000  # from a request to the sample, as a public driver has it
 _REPLY_NS = 150_000  # to the end of the reply
 _MAX_SETTINGS = 10_000  # that are remembered
 
@@ -133,7 +133,7 @@ class PuckEmulator(EmulatedAmplifier):
             new = value
             self._at(now_ns + _SETTING_NS, lambda due: self._set(number, new, due))
         elif self._name(number) == "P":
-            self._at(now_ns + _SAMPLING_NS, self._sample)
+            self._at(now_ns + SAMPLING_NS, self._sample)
             self._interfere(now_ns)
         else:
             self._at(now_ns + _REPLY_NS, lambda due: self._reply(number, due))
@@ -230,7 +230,7 @@ class PuckEmulator(EmulatedAmplifier):
         counts = self._encoder_counts(self._counts(now_ns), now_ns)
         data = encode_position(counts + self._offset)
         reply = Frame(reply_identifiers(self._puck)[0], data)
-        self._answer(reply, now_ns + _REPLY_NS - _SAMPLING_NS)
+        self._answer(reply, now_ns + _REPLY_NS - SAMPLING_NS)
 
 
 def connected(

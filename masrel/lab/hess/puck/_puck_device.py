@@ -37,7 +37,7 @@ from masrel.lab.hess.puck._bus import (
     encode_value,
     reply_identifiers,
 )
-from masrel.lab.hess.puck._emulator import connected
+from masrel.lab.hess.puck._emulator import SAMPLING_NS, connected
 from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
     ID,
@@ -53,9 +53,6 @@ from masrel.lab.hess.puck._puck_options import (
     Transmission,
     property_table,
 )
-
-# From a request to the sample of the encoder, as one of the public drivers has it
-_SAMPLING_NS = 75_000
 
 _POSITION = -1  # stands for its position among the numbers of other properties
 
@@ -132,7 +129,7 @@ class PuckNode(Node):
             raise DeviceTimeoutError(
                 f"puck {self.puck}: no position within {patience_s * 1e3:g} ms"
             )
-        return min(request_ns + _SAMPLING_NS, self.clock.now_ns()), counts
+        return min(request_ns + SAMPLING_NS, self.clock.now_ns()), counts
 
     def _sort(self, frame: Frame) -> None:
         if frame.identifier == self._position_reply:
@@ -198,7 +195,17 @@ class AwakePuck:
         arm_half = 1 if self.node.puck <= 4 else 2
         for name, group in (("GRPA", 0), ("GRPB", arm_half), ("GRPC", 4)):
             self._set(name, group)
-        self.transmission = self._read_transmission(options)  # what it counts in
+        counts, units = self._get("CTS"), self._get("IPNM")  # what it counts in
+        self.node.needs(
+            counts >= 1 and units >= 1,
+            f"CTS and IPNM above 0, got {counts} and {units}",
+        )
+        self.transmission = Transmission(
+            counts_per_turn=counts,
+            units_per_nm=units,
+            gear_ratio=options.gear_ratio,
+            direction=options.direction,
+        )
         largest = options.largest_torque
         self.max_units = math.floor(largest / self.transmission.torque_step)
         self.node.needs(
@@ -207,19 +214,6 @@ class AwakePuck:
             f"{self.max_units}",
         )
         self._set("MT", self.max_units)
-
-    def _read_transmission(self, options: PuckOptions) -> Transmission:
-        counts, units = self._get("CTS"), self._get("IPNM")
-        self.node.needs(
-            counts >= 1 and units >= 1,
-            f"CTS and IPNM above 0, got {counts} and {units}",
-        )
-        return Transmission(
-            counts_per_turn=counts,
-            units_per_nm=units,
-            gear_ratio=options.gear_ratio,
-            direction=options.direction,
-        )
 
     def _get(self, name: str) -> int:
         return self.node.get(self.table.number(name))
@@ -328,7 +322,6 @@ class PuckDevice(CanDevice[PuckOptions]):
     def __init__(self, setup: DeviceSetup, options: PuckOptions) -> None:
         super().__init__(setup, options, connected)
         self._n_left = _POLL_TICKS  # torques until the next of these questions
-        self._next_is_mode = True
         self._n_unanswered = 0
         self._asked_units = 0  # the torque it was set to when its torque was requested
         self._n_lost = 0
@@ -339,6 +332,8 @@ class PuckDevice(CanDevice[PuckOptions]):
             self._link, self._setup.clock, self._options, wakes=angle is not None
         )
         self._node = puck.node
+        of_torque = [puck.torque_id] * self._options.checks_torque
+        self._questions = itertools.cycle([puck.mode_id, *of_torque])
         if puck.was_asleep and angle is not None:
             puck.set_position(angle)
         _, counts = puck.node.position(puck.position_id, patience_s=0.05)
@@ -379,12 +374,10 @@ class PuckDevice(CanDevice[PuckOptions]):
     def _ask(self, units: int) -> None:
         self._n_left = _POLL_TICKS
         self._n_unanswered += 1  # until the reply comes
-        if self._next_is_mode or not self._options.checks_torque:
-            self._node.request(self._puck.mode_id)
-        else:
+        number = next(self._questions)
+        if number == self._puck.torque_id:
             self._asked_units = units
-            self._node.request(self._puck.torque_id)
-        self._next_is_mode = not self._next_is_mode
+        self._node.request(number)
 
     def _check(self) -> None:
         try:
