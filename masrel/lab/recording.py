@@ -76,7 +76,8 @@ _FIRST_COLUMNS = frozenset(RECORDING_COLUMNS[:6])  # those of every recording
 _CATCH, _END, _FAULT = PHASES.index("catch"), RAMPS.index("end"), RAMPS.index("fault")
 _USUAL_THRESHOLD_DEG_S = 20.0  # before recordings said what theirs was
 
-_Columns = Mapping[str, NDArray[np.float64]]
+Floats = NDArray[np.float64]
+_Columns = Mapping[str, Floats]
 
 _COLUMN_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _LONGEST_NAME = 40
@@ -157,7 +158,7 @@ class Recording:
         If a column is missing, foreign, or of another length.
     """
 
-    columns: Mapping[str, NDArray[np.float64]] = field(compare=False, repr=False)
+    columns: Mapping[str, Floats] = field(compare=False, repr=False)
     facts: Mapping[str, Fact]
     channels: tuple[Channel, ...] = ()
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
 from masrel.lab.hess._can import Node
@@ -22,7 +21,7 @@ from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.recording import MEASURED_TORQUE
+from masrel.lab.recording import MEASURED_TORQUE, Floats
 
 # Before it turns
 
@@ -250,9 +249,7 @@ def steady_runs(
     return runs
 
 
-def linear_fit(
-    design: NDArray[np.float64], target: NDArray[np.float64]
-) -> tuple[list[float], list[float]]:
+def linear_fit(design: Floats, target: Floats) -> tuple[list[float], list[float]]:
     """Return coefficients and their standard errors from the residuals."""
     # of n rows of k terms, and n numbers
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)

@@ -10,7 +10,6 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.errors import DeviceError, ParameterError
 from masrel.lab.hess._clock import Clock
@@ -24,7 +23,7 @@ from masrel.lab.hess.device import (
 )
 from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.limits import _check_not_negative
-from masrel.lab.recording import MEASURED_TORQUE
+from masrel.lab.recording import MEASURED_TORQUE, Floats
 
 _LOWER, _FREE, _UPPER = -1, 0, 1  # which end stop the arm touches
 _RESOLUTION = math.radians(0.005)  # of the encoder: its step
@@ -120,7 +119,7 @@ def propagator(
     return (*angle_row, *speed_row, lag_left)
 
 
-def _exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _exponential(matrix: Floats) -> Floats:
     # (n, n) -> (n, n), by a Taylor series of the scaled matrix, squared back
     norm = float(np.abs(matrix).sum(axis=1).max())
     squarings = max(0, math.ceil(math.log2(norm / _MAX_NORM)))

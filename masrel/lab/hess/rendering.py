@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.lab.elbow._torque import _stepped
-from masrel.lab.elbow.motions import Motion
+from masrel.lab.elbow.motions import Floats, Motion
 from masrel.lab.elbow.tone import JointModel
 from masrel.lab.hess._clock import SimulatedClock
 from masrel.lab.hess._recorder import Presented
@@ -246,7 +245,7 @@ def _compared(
     )
 
 
-def _largest_and_rms(errors: NDArray[np.float64]) -> tuple[float, float]:
+def _largest_and_rms(errors: Floats) -> tuple[float, float]:
     # (n,) -> 0 and 0 where there are none
     mean_square = np.sum(errors**2) / max(errors.size, 1)
     return float(np.abs(errors).max(initial=0.0)), float(np.sqrt(mean_square))

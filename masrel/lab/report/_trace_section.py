@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.lab.analysis import Speed, SpeedSummary
 from masrel.lab.elbow import (
@@ -26,7 +25,13 @@ from masrel.lab.elbow import (
 )
 from masrel.lab.elbow._torque import Line, line
 from masrel.lab.protocol import Model, Protocol, joint_model
-from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
+from masrel.lab.recording import (
+    MEASURED_TORQUE,
+    Floats,
+    Recording,
+    read_recording,
+    stretches,
+)
 from masrel.lab.report._material import (
     FIGURES,
     MANY_MODELS,
@@ -54,9 +59,6 @@ _AROUND_S = 0.25  # shown before and after a measured stretch
 # Slower is no stretch, and its trace would last for minutes.
 _SLOWEST_DRAWN_DEG_S = 1.0
 _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
-
-
-_Floats = NDArray[np.float64]
 
 
 def speeds_section(material: Material) -> Iterator[Content]:
@@ -163,7 +165,7 @@ class TracedModel:
     lines: Sequence[Line]
     # of many: where most are at each "time", s, while half of them go on: (n_points,)
     # and "angle", deg, and "torque", N·m, from the lowest to the highest, (4, n_points)
-    band: Mapping[str, _Floats] | None
+    band: Mapping[str, Floats] | None
 
 
 def traces_section(material: Material) -> Iterator[Content]:
@@ -247,7 +249,7 @@ def _traced(
     )
 
 
-def _band(joint: JointModel, motions: Sequence[Motion]) -> dict[str, _Floats]:
+def _band(joint: JointModel, motions: Sequence[Motion]) -> dict[str, Floats]:
     # stretches at evenly spaced quantiles of the speeds: as many are below each time's
     # quantile as of all stretches; the slower half goes on to the end of the band
     ends = np.array([motion.duration for motion in motions])
@@ -373,7 +375,7 @@ def _first_of_each_model(material: Material, folder: Path) -> list[Recording]:
     return [first[model] for model in models if model in first]
 
 
-MeasuredPanel = tuple[str, _Floats, _Floats, _Floats, _Floats]
+MeasuredPanel = tuple[str, Floats, Floats, Floats, Floats]
 """A title; time, s, angle, deg, and torque that was sent and measured, N·m."""
 
 

@@ -12,14 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from masrel._input import refuse
 from masrel.errors import ParameterError
-from masrel.lab.recording import PHASES
+from masrel.lab.recording import PHASES, Floats
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import aligned, fixed_or_significant, significant
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from masrel.lab.elbow import ElbowParameters, JointModel, Motion, Outline
     from masrel.lab.elbow.tone import ToneModel
 
@@ -184,7 +181,7 @@ def _degrees(angle: float | None) -> float | None:
     return None if angle is None else math.degrees(angle)
 
 
-_TorqueOf = Callable[[Sequence[float]], "NDArray[np.float64]"]
+_TorqueOf = Callable[[Sequence[float]], "Floats"]
 
 
 def _torques(
