@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import msgspec
 
@@ -102,15 +102,15 @@ class PropertyTable:
     def __post_init__(self) -> None:
         absent = [name for name in REQUIRED if name not in self.numbers]
         refuse(
-            (absent, f"properties: need {', '.join(absent)} too"),
             *(
                 (
-                    not _LOWEST <= number <= _HIGHEST,
-                    f"properties.{name}: needs {_LOWEST} to {_HIGHEST}, got {number}; "
-                    "0 to 7 are the same for every firmware",
+                    type(number) is not int or not _LOWEST <= number <= _HIGHEST,
+                    f"properties.{name}: needs {_LOWEST} to {_HIGHEST}, got "
+                    f"{number!r}; 0 to 7 are the same for every firmware",
                 )
                 for name, number in self.numbers.items()
             ),
+            (absent, f"properties: need {', '.join(absent)} too"),
         )
         taken: dict[int, str] = {}
         for name, number in self.numbers.items():
@@ -207,7 +207,7 @@ def property_table(firmware: int) -> PropertyTable:
 class _PropertyFile(msgspec.Struct, forbid_unknown_fields=True):
     """A file of property numbers."""
 
-    properties: dict[str, int]
+    properties: dict[str, Any]
 
 
 def read_property_table(path: Path) -> PropertyTable:
@@ -236,7 +236,7 @@ def read_property_table(path: Path) -> PropertyTable:
         return PropertyTable(numbers=file.properties)
     except (ValueError, msgspec.ValidationError) as error:
         raise ParameterError(
-            f"{path}: needs one table, [properties], of whole numbers: {error}"
+            f"{path}: needs one table, [properties], of numbers: {error}"
         ) from error
 
 
