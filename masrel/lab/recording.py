@@ -76,8 +76,8 @@ _FIRST_COLUMNS = frozenset(RECORDING_COLUMNS[:6])  # those of every recording
 _CATCH, _END, _FAULT = PHASES.index("catch"), RAMPS.index("end"), RAMPS.index("fault")
 _USUAL_THRESHOLD_DEG_S = 20.0  # before recordings said what theirs was
 
-Floats = NDArray[np.float64]
-_Columns = Mapping[str, Floats]
+_Floats = NDArray[np.float64]
+_Columns = Mapping[str, _Floats]
 
 _COLUMN_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _LONGEST_NAME = 40
@@ -158,7 +158,7 @@ class Recording:
         If a column is missing, foreign, or of another length.
     """
 
-    columns: Mapping[str, Floats] = field(compare=False, repr=False)
+    columns: Mapping[str, _Floats] = field(compare=False, repr=False)
     facts: Mapping[str, Fact]
     channels: tuple[Channel, ...] = ()
 
@@ -386,7 +386,7 @@ def write_recording(recording: Recording, path: Path) -> str:
     channels = [channel.column for channel in recording.channels]
     ordered = {n: recording.columns[n] for n in (*RECORDING_COLUMNS, *channels)}
     archive = io.BytesIO()
-    # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
+    # _Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
     np.savez_compressed(archive, **ordered)  # type: ignore[arg-type]
     checksum = sha256_of(archive.getbuffer())
     document: dict[str, object] = {

@@ -32,8 +32,8 @@ from masrel.lab.recording import (
     _TORQUE_GAINS,
     ESTIMATED_TORQUE,
     MEASURED_TORQUE,
-    Floats,
     Recording,
+    _Floats,
 )
 
 _REST_S = 2.0
@@ -154,10 +154,10 @@ def _pulsed_fit(ticks: list[Tick], viscous: float) -> tuple[float, float]:
     way = np.cumsum(gone) - gone
     rows = time > sent[0] + _DELAYS_S[1]
     powers = np.vander(time[rows] - time.mean(), _N_SMOOTH)
-    smooth: Floats = np.linalg.qr(powers)[0]
+    smooth: _Floats = np.linalg.qr(powers)[0]
 
-    def left(column: Floats) -> Floats:
-        values: Floats = column[rows]
+    def left(column: _Floats) -> _Floats:
+        values: _Floats = column[rows]
         return values - smooth @ (smooth.T @ values)
 
     damped = viscous * np.cumsum(angle * np.gradient(time))
@@ -310,7 +310,7 @@ def compare_models(
     return models, lines
 
 
-def lateness_ms(recordings: Sequence[Recording], rate_hz: int) -> Floats:
+def lateness_ms(recordings: Sequence[Recording], rate_hz: int) -> _Floats:
     """Return how late each tick was, beside the promptest of its recording, ms."""
     times_ns = (np.rint(1e9 * each.columns["time_s"]) for each in recordings)
     late_ns = [np.mod(each, 1e9 / rate_hz) for each in times_ns]

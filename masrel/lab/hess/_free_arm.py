@@ -21,7 +21,7 @@ from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.recording import MEASURED_TORQUE, Floats
+from masrel.lab.recording import MEASURED_TORQUE, _Floats
 
 # Before it turns
 
@@ -249,7 +249,7 @@ def steady_runs(
     return runs
 
 
-def linear_fit(design: Floats, target: Floats) -> tuple[list[float], list[float]]:
+def linear_fit(design: _Floats, target: _Floats) -> tuple[list[float], list[float]]:
     """Return coefficients and their standard errors from the residuals."""
     # of n rows of k terms, and n numbers
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)

@@ -31,13 +31,13 @@ from masrel.lab.recording import (
     RAMPS,
     RECORDING_COLUMNS,
     Channel,
-    Floats,
     Recording,
     _channels_of,
+    _Floats,
     _main_stretch,
 )
 
-Columns = dict[str, Floats]
+Columns = dict[str, _Floats]
 
 _N_COLUMNS = len(RECORDING_COLUMNS)
 _N_COLUMNS_ONCE = 6  # before the column `ramp`, and before they said how many
@@ -146,7 +146,7 @@ def _laid_down(file: Path | None, header: bytes, n_bytes: int) -> mmap.mmap:
         raise
 
 
-def recorded_columns(written: Floats, channels: Sequence[Channel] = ()) -> Columns:
+def recorded_columns(written: _Floats, channels: Sequence[Channel] = ()) -> Columns:
     """Return what the loop wrote by name, in the units of a recording."""
     # written (n_columns, n) -> (n,)
     time_s, angle, velocity, model, command, phase, ramp, stretch, *measured = written
@@ -166,7 +166,7 @@ def recorded_columns(written: Floats, channels: Sequence[Channel] = ()) -> Colum
     return columns
 
 
-def _from_the_onset(stretch: Floats, velocity: Floats) -> Floats:
+def _from_the_onset(stretch: _Floats, velocity: _Floats) -> _Floats:
     # stretch, velocity (n,) -> (n,): the loop knows that the arm is stretched when it
     # has gone some way; a stretch began where the arm began to go it
     complete = stretch.copy()
@@ -277,7 +277,7 @@ def cut_off(spool: Path) -> Presented | None:
     )
 
 
-def _written(facts: dict[str, Fact], data: bytes) -> Floats:
+def _written(facts: dict[str, Fact], data: bytes) -> _Floats:
     # -> (n_columns, n): the samples, as the loop wrote them; `facts` without what is of
     # the file. Raises ValueError, KeyError or TypeError where it is no such file.
     capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]

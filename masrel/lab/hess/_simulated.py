@@ -23,7 +23,7 @@ from masrel.lab.hess.device import (
 )
 from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.limits import _check_not_negative
-from masrel.lab.recording import MEASURED_TORQUE, Floats
+from masrel.lab.recording import MEASURED_TORQUE, _Floats
 
 _LOWER, _FREE, _UPPER = -1, 0, 1  # which end stop the arm touches
 _RESOLUTION = math.radians(0.005)  # of the encoder: its step
@@ -119,7 +119,7 @@ def propagator(
     return (*angle_row, *speed_row, lag_left)
 
 
-def _exponential(matrix: Floats) -> Floats:
+def _exponential(matrix: _Floats) -> _Floats:
     # (n, n) -> (n, n), by a Taylor series of the scaled matrix, squared back
     norm = float(np.abs(matrix).sum(axis=1).max())
     squarings = max(0, math.ceil(math.log2(norm / _MAX_NORM)))

@@ -27,8 +27,8 @@ from masrel.lab.elbow._torque import Line, line
 from masrel.lab.protocol import Model, Protocol, joint_model
 from masrel.lab.recording import (
     MEASURED_TORQUE,
-    Floats,
     Recording,
+    _Floats,
     read_recording,
     stretches,
 )
@@ -165,7 +165,7 @@ class TracedModel:
     lines: Sequence[Line]
     # of many: where most are at each "time", s, while half of them go on: (n_points,)
     # and "angle", deg, and "torque", N·m, from the lowest to the highest, (4, n_points)
-    band: Mapping[str, Floats] | None
+    band: Mapping[str, _Floats] | None
 
 
 def traces_section(material: Material) -> Iterator[Content]:
@@ -249,7 +249,7 @@ def _traced(
     )
 
 
-def _band(joint: JointModel, motions: Sequence[Motion]) -> dict[str, Floats]:
+def _band(joint: JointModel, motions: Sequence[Motion]) -> dict[str, _Floats]:
     # stretches at evenly spaced quantiles of the speeds: as many are below each time's
     # quantile as of all stretches; the slower half goes on to the end of the band
     ends = np.array([motion.duration for motion in motions])
@@ -375,7 +375,7 @@ def _first_of_each_model(material: Material, folder: Path) -> list[Recording]:
     return [first[model] for model in models if model in first]
 
 
-MeasuredPanel = tuple[str, Floats, Floats, Floats, Floats]
+MeasuredPanel = tuple[str, _Floats, _Floats, _Floats, _Floats]
 """A title; time, s, angle, deg, and torque that was sent and measured, N·m."""
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from masrel._input import refuse
 from masrel.errors import ParameterError
-from masrel.lab.recording import PHASES, Floats
+from masrel.lab.recording import PHASES, _Floats
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import aligned, fixed_or_significant, significant
 
@@ -181,7 +181,7 @@ def _degrees(angle: float | None) -> float | None:
     return None if angle is None else math.degrees(angle)
 
 
-_TorqueOf = Callable[[Sequence[float]], "Floats"]
+_TorqueOf = Callable[[Sequence[float]], "_Floats"]
 
 
 def _torques(

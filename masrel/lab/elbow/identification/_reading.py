@@ -20,7 +20,7 @@ from masrel.lab._study_files import MAX_RECORDING, read_regular, sha256_of
 from masrel.lab.recording import (
     _FIRST_COLUMNS,
     MEASURED_TORQUE,
-    Floats,
+    _Floats,
     _read_columns,
     read_recording,
 )
@@ -90,10 +90,10 @@ class Movement:
     """
 
     name: str
-    time: Floats = field(compare=False, repr=False)
-    angle: Floats = field(compare=False, repr=False)
-    torque: Floats = field(compare=False, repr=False)
-    velocity: Floats | None = field(default=None, compare=False, repr=False)
+    time: _Floats = field(compare=False, repr=False)
+    angle: _Floats = field(compare=False, repr=False)
+    torque: _Floats = field(compare=False, repr=False)
+    velocity: _Floats | None = field(default=None, compare=False, repr=False)
     saturated: NDArray[np.bool_] = field(init=False, compare=False, repr=False)
     simulated: bool = False
     torque_source: TorqueSource = "recorded"
@@ -122,7 +122,7 @@ class Movement:
             column.setflags(write=False)
 
 
-def _check_time(name: str, time: Floats) -> None:
+def _check_time(name: str, time: _Floats) -> None:
     if time.size < _MIN_SAMPLES:
         raise RecordingError(
             f"{name}: needs at least {_MIN_SAMPLES} samples, got {time.size}"
@@ -143,7 +143,7 @@ def _check_time(name: str, time: Floats) -> None:
         )
 
 
-def _check_sizes(name: str, angle: Floats, torque: Floats) -> None:
+def _check_sizes(name: str, angle: _Floats, torque: _Floats) -> None:
     low, high = math.degrees(angle.min()), math.degrees(angle.max())
     largest = float(np.abs(torque).max())
     is_small, needed = high - low < math.degrees(MIN_TRAVEL), math.degrees(MIN_TRAVEL)
@@ -168,7 +168,7 @@ def _check_sizes(name: str, angle: Floats, torque: Floats) -> None:
     )
 
 
-def _saturated(name: str, torque: Floats) -> NDArray[np.bool_]:
+def _saturated(name: str, torque: _Floats) -> NDArray[np.bool_]:
     # samples of long runs at the largest or smallest torque; long runs elsewhere too
     # mean a coarse or noise-free sensor, not a saturated one
     starts = np.flatnonzero(np.diff(torque, prepend=np.nan) != 0.0)
@@ -279,7 +279,7 @@ class _Table:
     """A recording of any kind: its columns by name, as they are asked for."""
 
     names: Sequence[str]
-    column: Callable[[str], Floats]
+    column: Callable[[str], _Floats]
     simulated: bool
     model: str | None = None
     sha256: str
@@ -309,7 +309,7 @@ def _read_archive(path: Path, content: bytes) -> _Table:
     else:
         simulated = bool(np.any(arrays.pop("simulated", False)))
 
-    def column(name: str) -> Floats:
+    def column(name: str) -> _Floats:
         array = arrays[name]
         if array.ndim != 1 or array.dtype.kind not in "iuf":
             raise RecordingError(
@@ -360,7 +360,7 @@ def _read_text(path: Path, content: bytes) -> _Table:
                 f"{path}, line {line}: needs {len(names)} cells, got {len(row)}"
             )
 
-    def column(name: str) -> Floats:
+    def column(name: str) -> _Floats:
         place = names.index(name)
         numbers = []
         for line, row in filled.items():
@@ -390,7 +390,7 @@ def _number(cell: str) -> float:
     return value
 
 
-def read_angles(path: Path) -> tuple[Floats, Floats]:
+def read_angles(path: Path) -> tuple[_Floats, _Floats]:
     """Return times, s, and angles, rad, of a recording, whatever else is in it."""
     table = _read_table(path)
     columns = _find_columns(
@@ -519,9 +519,9 @@ class Samples(NamedTuple):
     """A movement at even times, each column of shape (n_samples,), SI units."""
 
     period: float
-    time: Floats
-    angle: Floats
-    torque: Floats
+    time: _Floats
+    angle: _Floats
+    torque: _Floats
     in_gap: NDArray[np.bool_]
     saturated: NDArray[np.bool_]
 
