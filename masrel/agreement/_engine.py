@@ -52,7 +52,7 @@ them, and their sums are not rounded."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """Features of rows of ratings: m of every row, and n of which a row has few.
+    """Features of rows of ratings: m that every row has, and n that few rows have.
 
     The latter say how often a rater, or any rater, chose a category. Only those that
     are not 0 are kept, so that any number of categories costs the same.

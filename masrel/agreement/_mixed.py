@@ -120,7 +120,7 @@ class _Likelihood:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Components:
-    """Variances of items, raters (0 where there are none) and residual, in unit²."""
+    """Variances of items, raters (0 without raters) and residual, in unit²."""
 
     items: float
     raters: float

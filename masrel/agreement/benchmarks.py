@@ -361,7 +361,7 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     -----
     UndefinedStatisticWarning
         If there are no probabilities. An error of 0 means that no item moves the
-        estimate, which is no certainty.
+        estimate, which does not make it certain.
 
     Notes
     -----

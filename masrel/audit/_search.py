@@ -331,7 +331,7 @@ class ItemTables(_Search):
 
     Of a table only two sums matter: disagreement, which adds up over items, and how
     often each category was chosen in all. Items are added one by one; tables that have
-    both sums alike are one state from there on, which keeps how many they are. A
+    both sums alike become one state, which keeps their number. A
     printed percentage drops states from which it can no longer be reached. If there are
     too many states for the bound on work, an even choice of them is kept: then only a
     part of the tables is counted, and nothing follows if none fits.

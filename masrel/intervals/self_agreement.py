@@ -55,7 +55,7 @@ class RetestModel:
     raters : tuple of Quantity
         Kappa of every rater with a pair, pulled towards the others.
     n_pairs : tuple of int
-        Items that each of them graded in both sessions.
+        Number of items that each rater graded in both sessions.
     prior : str
         What was believed before the data.
     other_kappa : Quantity

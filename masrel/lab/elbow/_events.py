@@ -125,7 +125,7 @@ class Events(_Reached):
         The phases in order.
     onset, catch, catch_angle, catch_speed : float or None
         As of `StretchEvents`, of the first stretch that catches, or of the first if
-        none does; None if there is none.
+        none does; None if there is no stretch.
     mean_speed, peak_end, catch_end, post_catch_end : float or None
         Likewise.
     """

@@ -113,7 +113,7 @@ class InjectedFault:
 
     @property
     def amount(self) -> float:
-        """Its size, or that of its kind; 0 where there is none."""
+        """Its size, or that of its kind; 0 if it has none."""
         return _SIZES.get(self.kind, 0.0) if self.size is None else self.size
 
 

@@ -269,7 +269,7 @@ def fit_friction(
     runs : sequence of SteadyRun
         At two speeds or more, in both directions.
     inertia : float, optional
-        Of the free arm, kg·m²: what accelerates it is no friction.
+        Inertia of the free arm, kg·m²: what accelerates it is not friction.
 
     Returns
     -------

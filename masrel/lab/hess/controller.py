@@ -162,7 +162,7 @@ class Controller:
 
     Where a catch or post-catch ends otherwise, the torque goes from where it stands to
     that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
-    meanwhile ends this at once. Where a guarded model gives up more than 0.25 N·m in
+    meanwhile ends this at once. If a guarded model gives up more than 0.25 N·m in
     one tick, as clonus does, it goes as soon as no tick takes more than that.
 
     A model that is not passive is guarded: in every phase it is a fault when the arm
@@ -196,7 +196,7 @@ class Controller:
         soft hand for a lost grip, too small a one notices a lost grip late.
     post_catch_ramp : float, optional
         How long the end of a catch or post-catch takes, s, 0 to 1; 0 is the step of
-        Fig. 7. Of a guarded model only whether there is a ramp.
+        Fig. 7. A guarded model uses only whether there is a ramp.
     rate_hz : int, optional
         Steps a second.
 

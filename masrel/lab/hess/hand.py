@@ -385,7 +385,7 @@ class HumanHand(SimulatedHand):
     It intends the trapezoid of speed of a `SimulatedHand`, with ramps of 0.15 s. Its
     muscles give the torque it expects, that of an arm before its catch, and besides
     follow the intention through a spring and a damper only. So a catch comes as a
-    surprise: the arm falls behind. Where the hand has been is answered a reaction
+    surprise: the arm falls behind. The deviation is answered a reaction time
     later, by a correction that grows until the arm is where it should be; it adds at
     most 15 N·m. A tremor goes on all the time. The grip is lost at `slip_time` alone.
 

@@ -447,7 +447,7 @@ def _absent(
     if absent:
         yield (
             f"{sheet.path}: needed a row for each of {len(form.codes)} presentations, "
-            f"got none of {'; '.join(absent)}: its grade is {NO_GRADE} where there is "
+            f"got none of {'; '.join(absent)}: its grade is {NO_GRADE} if there is "
             "none"
         )
     for when in form.afterwards:
