@@ -43,7 +43,7 @@ GROUPS = {
         "demo": "Run a complete simulated study.",
         "init": "Make a new study from a template.",
         "check": "Check a study and list every problem.",
-        "schedule": "Draw the schedules, show their balance, or copy for a site.",
+        "schedule": "Draw schedules, show their balance, or copy a study for a site.",
         "run": "Present a schedule's models and record every grade.",
         "serve": "Show pages for the rater's tablet and the coordinator's screen.",
         "train": "Train a rater on models of known grade until a test is passed.",
