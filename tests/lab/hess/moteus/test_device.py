@@ -172,15 +172,19 @@ def test_a_free_arm_says_its_friction() -> None:
 
 
 @pytest.mark.parametrize(
-    "n",
+    "numbers",
     [
-        2,
-        pytest.param(20, marks=pytest.mark.slow),
-        pytest.param(10_000, marks=pytest.mark.long),
+        range(2),
+        pytest.param(range(2, 20), marks=pytest.mark.slow),
+        *(
+            pytest.param(range(first, first + 500), marks=pytest.mark.long)
+            for first in range(0, 10_000, 500)
+        ),
     ],
+    ids=str,
 )
-def test_no_presentation_fails_that_nothing_is_wrong_with(n: int) -> None:
-    for number in range(n):
+def test_no_presentation_fails_that_nothing_is_wrong_with(numbers: range) -> None:
+    for number in numbers:
         clock, speed = SimulatedClock(), 40.0 + 80.0 * ((number * 0.618) % 1.0)
         hand = stretching(speed)
         with opened(clock=clock, hand=hand) as device:
