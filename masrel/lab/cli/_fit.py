@@ -249,7 +249,8 @@ def fit(
         )
     with warnings_as_notes():
         movements = recordings.read(of_device=False, quiet=output.quiet)
-        results = _fit_joint(movements, _options(of_joint, level), compare, laws)
+        options = _options(of_joint, level)
+        results = _fit_joint(movements, options, compare, laws, quiet=output.quiet)
     _write(*results, folder, output)
     if model_file is not None:
         _write_model(results[0], model_file)
@@ -277,14 +278,23 @@ def _fit_joint(
     options: "dict[str, Any]",
     compare: bool,
     laws: str | None,
+    *,
+    quiet: bool,
 ) -> "_Results":
     # the elbow's fit, which is None where only other laws can be fitted, and what it
     # is compared with
+    from tqdm import tqdm
+
     from masrel.lab.elbow import identification
 
     if laws is not None:
         names = None if laws == "all" else laws.split(",")
-        compared_laws = identification.compare_laws(movements, laws=names, **options)
+        with tqdm(
+            desc="fitting laws", unit=" laws", disable=quiet or None, delay=1.0
+        ) as bar:
+            compared_laws = identification.compare_laws(
+                movements, laws=names, progress=bar.update, **options
+            )
         return compared_laws.elbow, (), compared_laws
     if not compare:
         return identification.fit(movements, **options), (), None

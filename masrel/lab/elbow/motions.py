@@ -8,8 +8,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache, wraps
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -753,8 +754,27 @@ class OneWay:
         return None
 
 
-def one_way(motion: Motion) -> Iterator[OneWay]:
-    """Give the parts of a motion that go one way, in order."""
+_Found = TypeVar("_Found")
+
+
+def _once_per_laid(find: Callable[..., _Found]) -> Callable[..., _Found]:
+    # a fit asks the same of a recording some thousand times
+    kept = lru_cache(maxsize=64)(find)
+
+    @wraps(find)
+    def found(motion: Motion, *args: float) -> _Found:
+        return (kept if isinstance(motion, _Laid) else find)(motion, *args)
+
+    return found
+
+
+@_once_per_laid
+def one_way(motion: Motion) -> tuple[OneWay, ...]:
+    """Return the parts of a motion that go one way, in order."""
+    return tuple(_one_way(motion))
+
+
+def _one_way(motion: Motion) -> Iterator[OneWay]:
     for piece in motion.pieces():
         angle = [motion.origin + piece.angle[0], *piece.angle[1:]]
         for low, high in pairwise(split_at_roots(derivative(angle), piece.length)):
@@ -782,10 +802,12 @@ def spans(
     return result
 
 
-def movements(motion: Motion, speed: float) -> list[tuple[float, float]]:
+@_once_per_laid
+def movements(motion: Motion, speed: float) -> tuple[tuple[float, float], ...]:
     """Return between which times the arm goes one way at least so fast, s."""
     extends = spans(motion, lambda part: part.faster(speed, 1))
-    return sorted(extends + spans(motion, lambda part: part.faster(speed, -1)))
+    flexes = spans(motion, lambda part: part.faster(speed, -1))
+    return tuple(sorted(extends + flexes))
 
 
 def latched(

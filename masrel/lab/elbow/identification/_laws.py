@@ -294,6 +294,7 @@ def compare_laws(
     recordings: Sequence[Movement | Path | str],
     *,
     laws: Sequence[str] | None = None,
+    progress: Callable[[], object] = lambda: None,
     **options: Any,
 ) -> LawComparison:
     """Fit laws of tone beside the elbow's, and predict each recording from the others.
@@ -304,6 +305,8 @@ def compare_laws(
         As for `fit`; each begins at rest.
     laws : sequence of str, optional
         Which of `LAWS`, and of those that cannot be fitted; all by default.
+    progress : callable, optional
+        Called after each law, the elbow's first.
     **options
         Those of `fit`. Weight and inertia of the arm, fitted or fixed, count for every
         law; what else an arm has for the elbow's alone.
@@ -342,16 +345,15 @@ def compare_laws(
     )
     binned = [_binned(movement, options) for movement in movements]
     elbow, first = _elbow_fit(movements, binned, options)
-    nothing = np.full(len(binned), math.nan)
-    fits = [
-        first,
-        *(
+    progress()
+    nothing, fits = np.full(len(binned), math.nan), [first]
+    for name in names:
+        fits.append(
             LawFit(name=name, squares=nothing, reason=UNFITTED[name])
             if name in UNFITTED
             else _law_fit(name, binned, options)
-            for name in names
-        ),
-    ]
+        )
+        progress()
     worse, ses = against_best(np.array([each.squares for each in fits]))[1:]
     return LawComparison(
         fits=tuple(fits),

@@ -52,6 +52,7 @@ TRUE: dict[str, JointModel] = {
     "clonus": Clonus(),
     "spastic-elbow": STANDARD_MODELS["HM3"],
 }
+SLOW = ("threshold-stretch-reflex", "clonus")  # the others are by hand
 
 
 def recordings(joint: JointModel, seed: int, *, n: int = 6) -> list[Movement]:
@@ -91,8 +92,13 @@ def of(found: LawComparison, name: str) -> int:
 
 # The seed is fixed. A larger law that contains the true one predicts better by more
 # than one standard error by chance: of six recordings in 18 % of seeds at most, by t.
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TRUE)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in SLOW else pytest.mark.long)
+        for name in TRUE
+    ],
+)
 def test_its_own_law_predicts_left_out_recordings_best(name: str) -> None:
     found = compare_laws(recordings(TRUE[name], 0))
     own = of(found, name)
