@@ -65,7 +65,7 @@ def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twic
     rater = start(stage)
     rater.wait_for("instructions")
     for each in (coordinator, second):
-        sees(each, "reads the instructions")
+        sees(each, "is reading the instructions")
     status, body = second.post(
         "/coordinator/start", rater="R60", session="test", rehearsal=False
     )
@@ -79,7 +79,7 @@ def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twic
     local = f"{utc + timedelta(hours=5, minutes=30):%-I:%M}"
     expect(time.locator(".faint")).to_contain_text(local)
     rater.go_until("grade")
-    sees(coordinator, f"{stage.rater} grades practice")
+    sees(coordinator, f"{stage.rater} is grading practice")
     press(second.page, "Pause the session")
     rater.wait_for("over")
     sees(coordinator, "No session is running")
@@ -87,7 +87,7 @@ def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twic
     start(stage)
     rater.go_until("break")
     coordinator.page.reload()
-    sees(coordinator, "has a break")
+    sees(coordinator, "is having a break")
     sees(coordinator, "practice-grade", "#log")
     rater.go_until("over")
     coordinator.page.reload()
