@@ -253,7 +253,7 @@ def what_was_kept(presented) -> None:
     "n",
     [
         40,
-        pytest.param(400, marks=pytest.mark.slow),
+        pytest.param(100, marks=pytest.mark.slow),
         pytest.param(4000, marks=pytest.mark.long),
     ],
 )

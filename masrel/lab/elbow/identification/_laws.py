@@ -25,7 +25,6 @@ from masrel.lab.elbow.identification._clusters import (
     Floats,
     Rows,
     fitted,
-    left_out_steps,
     solve,
 )
 from masrel.lab.elbow.identification._identify import (
@@ -56,9 +55,10 @@ from masrel.lab.elbow.tone import (
 # within; the angle's filter passes no more.
 _BIN_S, _WITHIN, _WINDOW_S = 0.02, 4, 0.06
 
-# Evaluations from each start and from the best of them on, and the relative change of
-# the sum of squares, or of the parameters, that ends the search.
-_TRIED, _EVALUATIONS, _PRECISE = 3, 40, 1e-6
+# Evaluations from each start, from the best of them on, and from that fit on without a
+# recording; the relative change of the sum of squares, or of the parameters, that ends
+# the search.
+_TRIED, _EVALUATIONS, _AGAIN, _PRECISE = 3, 40, 10, 1e-6
 
 _SMALL = 1e-6
 _BOUNDS = {
@@ -314,9 +314,9 @@ def compare_laws(
     Returns
     -------
     LawComparison
-        A recording left out keeps its own constant and nothing else. The elbow's law is
-        fitted again without it; of the others, what the rest says is reckoned as linear
-        as the law is at the fit.
+        A recording left out keeps its own constant and nothing else. Every law is
+        fitted again without it; laws of tone from the fit to all on, in at most ten
+        evaluations.
 
     Raises
     ------
@@ -449,13 +449,16 @@ def _law_fit(
         arm[fits] = x[len(row.free) :]
         return each.left(joint.torque(each.motion, each.times), arm)
 
-    def residuals(x: Floats) -> Floats:
-        return np.concatenate([left(x, each) for each in binned])
+    def residuals(x: Floats, those: Sequence[_Binned]) -> Floats:
+        return np.concatenate([left(x, each) for each in those])
 
-    def search(start: Floats, most: int) -> OptimizeResult:
+    def search(
+        start: Floats, most: int, those: Sequence[_Binned] = binned
+    ) -> OptimizeResult:
         return least_squares(
             residuals,
             start,
+            args=(those,),
             bounds=(low, high),
             x_scale="jac",
             max_nfev=most,
@@ -473,14 +476,16 @@ def _law_fit(
     rows = [Rows(-slopes * is_free, residuals) for slopes, residuals in pairs]
     estimates = _estimates(names, best.x, is_free, rows, options, row.needs)
     lone = [e for e in estimates if e.n_trials < 2]
-    moved = np.clip(best.x + np.nan_to_num(left_out_steps(rows)), low, high)
-    errors = [left(x, each) for x, each in zip(moved, binned, strict=True)]
-    squares = np.array([float(e @ e) for e in errors])
+    squares = np.full(len(binned), math.nan)
+    for i, each in enumerate(binned) if not lone else ():
+        rest = search(best.x, _AGAIN, [*binned[:i], *binned[i + 1 :]])
+        error = left(rest.x, each)
+        squares[i] = error @ error
     return LawFit(
         name=name,
         estimates=estimates,
         rms=math.sqrt(2.0 * best.cost / len(binned)),
-        squares=np.full(len(binned), math.nan) if lone else squares,
+        squares=squares,
         reason=f"{lone[0].name}: {lone[0].reason}" if lone else None,
     )
 

@@ -128,9 +128,17 @@ def test_a_law_that_recordings_cannot_tell_says_why(reflex: LawComparison) -> No
     assert reflex.chosen == "spring-damper"
 
 
+def test_of_laws_that_predict_alike_the_simplest_is_chosen() -> None:
+    made = recordings(LeadPipe(coulomb_torque=0.0), 1, n=5)
+    found = compare_laws(made, laws=["lead-pipe-rigidity", "spring-damper"])
+    assert np.all(found.worse[1:] <= found.worse_se[1:])
+    assert found.chosen == "spring-damper"
+
+
 def test_leaving_one_out_is_near_a_fit_without_it() -> None:
     # another implementation: the law's linear columns, fitted anew without each
     made = recordings(LeadPipe(coulomb_torque=0.0), 2, n=5)
+    made[-1] = replace(made[-1], torque=1.5 * made[-1].torque)  # unlike the others
     found = compare_laws(made, laws=["spring-damper"])
     (law,) = [each for each in found.fits if each.name == "spring-damper"]
 
