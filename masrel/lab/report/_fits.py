@@ -240,6 +240,7 @@ def law_tables(laws: LawComparison | None) -> tuple[Table, ...]:
         "Worse: mean square error minus that of the best law, with its standard error "
         "over recordings.",
         *(f"{each.name}: {each.reason}" for each in laws.fits if each.reason),
+        *(f"{each.name}: {text}" for each in laws.fits for text in each.remarks),
     )
     return (
         Table(
@@ -267,6 +268,7 @@ def law_document(laws: LawComparison | None) -> dict[str, object]:
             "worse_se_nm2": float(error),
             "chosen": each.name == laws.chosen,
             "reason": each.reason,
+            "remarks": each.remarks,
             "estimates": [_estimate(e, _law_quantity(each, e)) for e in each.estimates],
         }
         for each, worse, error in zip(laws.fits, laws.worse, laws.worse_se, strict=True)

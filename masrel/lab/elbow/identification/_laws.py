@@ -6,7 +6,7 @@ recording has a constant of its own, the sensor's zero, and all weigh the same.
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -59,6 +59,8 @@ _BIN_S, _WITHIN, _WINDOW_S = 0.02, 4, 0.06
 # recording; the relative change of the sum of squares, or of the parameters, that ends
 # the search.
 _TRIED, _EVALUATIONS, _AGAIN, _PRECISE = 3, 40, 10, 1e-6
+
+_NEAR_END = math.radians(2.0)  # of the farthest angle, where every movement stops
 
 _SMALL = 1e-6
 _BOUNDS = {
@@ -200,6 +202,8 @@ class LawFit:
         parameters, (N·m)²; ``nan`` if undefined.
     reason : str or None
         Why the law is not scored.
+    remarks : tuple of str
+        What to look at before the law is believed.
     """
 
     name: str
@@ -207,6 +211,7 @@ class LawFit:
     rms: float = math.nan
     squares: Floats = field(compare=False, repr=False)
     reason: str | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def n_parameters(self) -> int:
@@ -487,7 +492,21 @@ def _law_fit(
         rms=math.sqrt(2.0 * best.cost / len(binned)),
         squares=squares,
         reason=f"{lone[0].name}: {lone[0].reason}" if lone else None,
+        remarks=tuple(_remarks(estimates, binned)),
     )
+
+
+def _remarks(
+    estimates: Sequence[FittedParameter], binned: Sequence[_Binned]
+) -> Iterator[str]:
+    farthest = max(float(each.motion.angle(each.times).max()) for each in binned)
+    for e in estimates:
+        if e.name == "threshold" and e.value > farthest - _NEAR_END:
+            yield (
+                f"its threshold, {math.degrees(e.value):.1f} deg, is where the "
+                f"recorded movements end ({math.degrees(farthest):.1f} deg); look at "
+                "the torque there, which may be that of a stop and not of a reflex"
+            )
 
 
 def _estimates(

@@ -128,6 +128,26 @@ def test_a_law_that_recordings_cannot_tell_says_why(reflex: LawComparison) -> No
     assert reflex.chosen == "spring-damper"
 
 
+def stopped(m: Movement) -> Movement:
+    # the same as far as 134 deg, with a spring that is met 1 deg before
+    span = (math.radians(134.0) - m.angle[0]) / (m.angle.max() - m.angle[0])
+    angle = m.angle[0] + (m.angle - m.angle[0]) * span
+    return replace(
+        m,
+        angle=angle,
+        torque=m.torque + 150.0 * np.maximum(angle - math.radians(133.0), 0.0),
+    )
+
+
+def test_a_threshold_where_the_movements_stop_is_remarked_on() -> None:
+    law = ["threshold-stretch-reflex"]
+    made = recordings(LeadPipe(coulomb_torque=0.0), 1, n=4)
+    (found,) = compare_laws([stopped(m) for m in made], laws=law).fits[1:]
+    assert "where the recorded movements end (134.0 deg)" in " ".join(found.remarks)
+    (clear,) = compare_laws(recordings(ThresholdReflex(), 1, n=4), laws=law).fits[1:]
+    assert clear.remarks == ()
+
+
 def test_of_laws_that_predict_alike_the_simplest_is_chosen() -> None:
     made = recordings(LeadPipe(coulomb_torque=0.0), 1, n=5)
     found = compare_laws(made, laws=["lead-pipe-rigidity", "spring-damper"])
