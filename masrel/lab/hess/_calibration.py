@@ -1,8 +1,8 @@
 """What a device is like, measured on it: noise, friction, inertia, delay, gain.
 
 In: an open device whose arm is free, or bears weights that are known or that a torque
-sensor reads. Out: numbers with intervals of 95 %. Of recordings: how near the torque
-that a device gives comes to the one that is asked for, and how late ticks are.
+sensor reads. Out: numbers with 95 % intervals. Also, from recordings: how near the
+torque that a device gives comes to the one that was asked for, and how late ticks are.
 """
 
 import math

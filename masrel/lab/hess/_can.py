@@ -284,7 +284,7 @@ class BusOptions(BackendOptions, ABC):
     def moves_hardware(self) -> bool:
         """Whether a motor may be on this bus.
 
-        There is none on python-can's "virtual" and "udp_multicast", nor on a network
+        No motor is on python-can's "virtual" and "udp_multicast", or on a network
         device whose name begins with "vcan".
         """
         return self.interface not in _WITHOUT_HARDWARE and not self.channel.startswith(

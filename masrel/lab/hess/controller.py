@@ -157,19 +157,19 @@ class Controller:
     at once and stays there until the arm has been moved back, faster than ν_th. Within
     3 deg of the end of range no loss counts: there it is the joint that stops the arm.
 
-    After a catch there is none until the arm has been flexed faster than ν_th by 5 deg
-    or for 100 ms: a catch throws a soft hand back by less, within one push.
+    A second catch needs a flexion in between, faster than ν_th, by 5 deg or for 100 ms:
+    a catch throws a soft hand back by less, within one push.
 
-    Where a catch or post-catch ends otherwise, the torque goes from where it stands to
+    Where a catch or post-catch ends otherwise, the torque goes from its value then to
     that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
     meanwhile ends this at once. If a guarded model gives up more than 0.25 N·m in
     one tick, as clonus does, it goes as soon as no tick takes more than that.
 
     A model that is not passive is guarded: in every phase it is a fault when the arm
-    gets within 6 ms more than 0.78 of the speed that the torque would give it if nobody
-    held it, from 2.8 N·m on, or when its speed falls by more than `slip_speed_drop`
-    within 10 ms while the model resists extension. The paper's own law has a trigger
-    too, and is released as the paper has it instead.
+    gets within 6 ms more than 0.78 of the speed that the torque, if it is 2.8 N·m or
+    more, would give it if nobody held it, or when its speed falls by more than
+    `slip_speed_drop` within 10 ms while the model resists extension. The paper's own
+    law has a trigger too, and is released as the paper has it instead.
 
     Parameters
     ----------

@@ -58,9 +58,9 @@ def run_presentation(
     """Present one model on an open device and record it.
 
     One stretch ends it: when the arm has been slower than `DeviceLimits.arrival_speed`
-    for `arrival_time` within `arrival_angle` of `end_angle` or beyond. Of many
-    stretches each ends so, or when the arm is brought back: flexed faster than ν_th, or
-    near where the stretch began. A stretch begins when the arm was extended by
+    for `arrival_time` within `arrival_angle` of `end_angle` or beyond. Each of several
+    stretches ends so, or when the arm is brought back: flexed faster than ν_th, or near
+    where the stretch began. A stretch begins when the arm was extended by
     `arrival_angle`; the next one only after the arm was flexed faster than ν_th, as the
     law has it, or was brought back without a catch. All the while the controller goes
     on. What it asks for before anything moves comes within 100 ms, along a raised

@@ -320,8 +320,8 @@ def compare_laws(
     -------
     LawComparison
         A recording left out keeps its own constant and nothing else. Every law is
-        fitted again without it; laws of tone from the fit to all on, in at most ten
-        evaluations.
+        fitted again without it. Laws of tone start from their fit to all recordings,
+        and take at most ten evaluations.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The contract that the loop relies on: what any device must hold, whoever wrote it.
 
-In: how devices are made. A rule that one breaks is a `DeviceError`. Of hardware the arm
-must be free and nobody near it: 0.1 N·m are sent.
+In: how devices are made. A rule that a device breaks is a `DeviceError`. If it is
+hardware, its arm must be free and nobody near it: 0.1 N·m are sent.
 """
 
 import importlib
