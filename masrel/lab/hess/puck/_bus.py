@@ -21,6 +21,9 @@ MAX_NODE = 31
 POSITION_GROUP = 3  # where pucks answer a request for P
 PROPERTY_GROUP = 6  # where they answer any other
 
+SAMPLING_NS = 75_000
+"""From a request for P to the encoder's sample, as one of the public drivers has it."""
+
 _GROUP_FLAG = 0x400
 
 

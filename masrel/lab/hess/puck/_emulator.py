@@ -17,6 +17,7 @@ from masrel.lab.hess.puck._bus import (
     POSITION_GROUP,
     PROPERTY_GROUP,
     SAFETY_NODE,
+    SAMPLING_NS,
     decode_request,
     encode_position,
     encode_value,
@@ -42,7 +43,6 @@ from masrel.lab.hess.puck._puck_options import (
 )
 
 _SETTING_NS = 110_000  # six bytes on the bus
-SAMPLING_NS = 75_000  # from a request to the sample, as a public driver has it
 _REPLY_NS = 150_000  # to the end of the reply
 _MAX_SETTINGS = 10_000  # that are remembered
 

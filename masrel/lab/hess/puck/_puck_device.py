@@ -31,13 +31,14 @@ from masrel.lab.hess._clock import Clock, RealClock
 from masrel.lab.hess.device import DeviceSetup, Reading
 from masrel.lab.hess.puck._bus import (
     MAX_TORQUE,
+    SAMPLING_NS,
     decode_position,
     decode_value,
     encode_get,
     encode_value,
     reply_identifiers,
 )
-from masrel.lab.hess.puck._emulator import SAMPLING_NS, connected
+from masrel.lab.hess.puck._emulator import connected
 from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
     ID,
