@@ -571,8 +571,9 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
         session = dataclasses.replace(session, options=options)
     present = functools.partial(_presented, session, table_v, calibration)
     published = hess2012.published_file.read_text("utf-8")
-    rows, stretches = [*csv.DictReader(published.splitlines())], []
-    with session.progress(len(rows)) as bar:
+    rows, stretches, parts = [*csv.DictReader(published.splitlines())], [], []
+    n_parts = math.ceil(minutes)
+    with session.progress(len(rows) + n_parts) as bar:
         for row in rows:
             speed = float(row["mean_speed_deg_s"])
             known = rendered(present(row["model"], speed_deg_s=speed))
@@ -580,8 +581,9 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
                 {"model": row["model"], "mean_speed_deg_s": speed, **known}
             )
             bar.update()
-    n_parts = math.ceil(minutes)
-    parts = [present("HM1", still_s=60.0 * minutes / n_parts) for _ in range(n_parts)]
+        for _ in range(n_parts):
+            parts.append(present("HM1", still_s=60.0 * minutes / n_parts))
+            bar.update()
     late = lateness_ms(parts, table_v.device.rate_hz)
     late_ms = np.percentile(late, (50, 99, 99.9, 100)).tolist()
     n_missed = sum(int(part.facts["n_missed_ticks"] or 0) for part in parts)
@@ -605,6 +607,8 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
             "faults": faults,
         },
     )
+    if faults:
+        sys.exit(1)
 
 
 def _presented(
@@ -649,6 +653,8 @@ def _presented(
             end_angle=_RANGE_END,
             **watching,
         )
-    if presented.fault is not None and still_s is None:
-        raise DeviceError(f"{model}: {presented.fault.message}")
+    fault = presented.fault
+    # Any other fault of a minute is reported with the rest
+    if fault is not None and (still_s is None or fault.kind == "emergency-stop"):
+        raise DeviceError(f"{model}: {fault.message}")
     return presented.recording

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from masrel.lab.hess import run_presentation
 from masrel.lab.hess.puck import steady_runs
 from tests.cli.process import Caller
 
@@ -93,6 +94,27 @@ def test_a_signal_is_an_emergency_stop_while_the_arm_turns(
     assert done.code == 1
     assert f"emergency stop: signal {name}" in done.err
     assert "Traceback" not in done.err
+
+
+@pytest.mark.slow  # 32 stretches come before the minutes
+def test_a_signal_in_a_minute_of_real_time_begins_no_other(
+    masrel: Caller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    minutes = []
+
+    def signalled(device, *arguments, max_duration_s=None, **options):
+        if max_duration_s is not None:
+            minutes.append(max_duration_s)
+            signal.raise_signal(signal.SIGTERM)
+        return run_presentation(
+            device, *arguments, max_duration_s=max_duration_s, **options
+        )
+
+    module = importlib.import_module("masrel.lab.cli.device")
+    monkeypatch.setattr(module, "run_presentation", signalled)
+    done = masrel("device", "fidelity", "--device", "simulated", "--minutes", 2)
+    assert (done.code, minutes) == (1, [60.0])
+    assert "emergency stop: signal SIGTERM" in done.err
 
 
 def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
