@@ -126,7 +126,7 @@ def test_and_what_else_is_behind_the_sensor(fitted: ElbowFit) -> None:
 def test_a_fit_says_which_torque_it_took(
     recordings: list[Path], fitted: ElbowFit, tmp_path: Path
 ) -> None:
-    said = "Torque of 9 of 9 recordings: measured by the device's sensor"
+    said = "The torque of 9 of 9 recordings was measured by the device's sensor"
     assert fitted.remarks[0].startswith(said)
     assert read_movement(recordings[0]).torque_source == "sensor"
     bare = [tmp_path / path.name for path in recordings]
