@@ -19,6 +19,7 @@ from masrel.cli._options import (
     call_text,
     echo_notes,
     grouped,
+    level_option,
     output_options,
     write_output,
 )
@@ -110,12 +111,7 @@ _ESTIMATING = {
         help="Give the standard error and interval for other items that irrCAC, SPSS, "
         "or psych and vcd (over_n) print.",
     ),
-    "level": click.option(
-        "--level",
-        default=0.95,
-        show_default=True,
-        help="Level of the intervals.",
-    ),
+    "level": level_option,
     "resamples": click.option(
         "--resamples",
         "n_resamples",

@@ -83,6 +83,11 @@ def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
     return decorate
 
 
+level_option = click.option(
+    "--level", default=0.95, show_default=True, help="Level of the intervals."
+)
+
+
 def split_commas(text: str) -> list[str]:
     """Return the parts of an option's value between its commas."""
     return [part.strip() for part in text.split(",")]

@@ -14,6 +14,7 @@ from masrel.cli._options import (
     call_text,
     floats,
     grouped,
+    level_option,
     output_options,
     split_commas,
     whole_numbers,
@@ -85,9 +86,7 @@ _LEVELS = ((1, 2, 3, 4, 6, 8), (1, 2, 4), (1, 2))
     metavar="N,…",
     help="Cost of a level of each facet, in order, and of a rating.  [default: 0,…,1]",
 )
-@click.option(
-    "--level", default=0.95, show_default=True, help="Level of the intervals."
-)
+@level_option
 @click.option("--seed", "rng", default=0, show_default=True, help="Random seed.")
 @grouped(
     "reading",

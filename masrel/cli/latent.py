@@ -13,6 +13,7 @@ from masrel.cli._options import (
     call_text,
     echo_notes,
     grouped,
+    level_option,
     output_options,
     progress,
     write_output,
@@ -38,9 +39,7 @@ if TYPE_CHECKING:
 @click.option(
     "--only", metavar="SESSION", help="Session to analyse, if there are several."
 )
-@click.option(
-    "--level", default=0.95, show_default=True, help="Level of the intervals."
-)
+@level_option
 @click.option(
     "--seed", default=0, show_default=True, help="Random seed of the sampler."
 )

@@ -12,6 +12,7 @@ from masrel.cli._options import (
     OutputOptions,
     call_text,
     grouped,
+    level_option,
     output_options,
     write_output,
 )
@@ -54,9 +55,7 @@ from masrel.ratings._findings import Reading
     type=click.FloatRange(min=0.0, min_open=True),
     help="Unit of places, such as 0.001 to count seconds in milliseconds.",
 )
-@click.option(
-    "--level", default=0.95, show_default=True, help="Level of the intervals."
-)
+@level_option
 @click.option(
     "--show",
     metavar="DOCUMENT",

@@ -386,7 +386,7 @@ def write_recording(recording: Recording, path: Path) -> str:
     channels = [channel.column for channel in recording.channels]
     ordered = {n: recording.columns[n] for n in (*RECORDING_COLUMNS, *channels)}
     archive = io.BytesIO()
-    # _Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
+    # Floats are never pickled; numpy 2.0 takes `allow_pickle` for a column.
     np.savez_compressed(archive, **ordered)  # type: ignore[arg-type]
     checksum = sha256_of(archive.getbuffer())
     document: dict[str, object] = {

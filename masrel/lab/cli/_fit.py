@@ -13,7 +13,9 @@ from masrel.cli._options import (
     GroupedHelp,
     OutputOptions,
     grouped,
+    level_option,
     output_options,
+    progress,
     write_output,
 )
 from masrel.cli._paths import InputFile, OutputFile
@@ -117,13 +119,6 @@ _recordings = grouped(
         multiple=True,
     ),
 )
-_level = click.option(
-    "--level",
-    type=float,
-    default=0.95,
-    show_default=True,
-    help="Level of the intervals.",
-)
 _figures = click.option(
     "--figures",
     "folder",
@@ -140,7 +135,7 @@ _output = output_options(
 
 @click.command("friction", cls=GroupedHelp)
 @_recordings
-@_level
+@level_option
 @_figures
 @_output
 def friction(
@@ -216,7 +211,7 @@ def friction(
     metavar="all|NAME,...",
     help="Also fit these laws of tone, and compare all laws by leaving recordings out.",
 )
-@_level
+@level_option
 @_figures
 @_output
 def fit(
@@ -283,17 +278,13 @@ def _fit_joint(
 ) -> "_Results":
     # the elbow's fit, which is None where only other laws can be fitted, and what it
     # is compared with
-    from tqdm import tqdm
-
     from masrel.lab.elbow import identification
 
     if laws is not None:
         names = None if laws == "all" else laws.split(",")
-        with tqdm(
-            desc="fitting laws", unit=" laws", disable=quiet or None, delay=1.0
-        ) as bar:
+        with progress("fitting laws", " laws", is_quiet=quiet) as report:
             compared_laws = identification.compare_laws(
-                movements, laws=names, progress=bar.update, **options
+                movements, laws=names, progress=report, **options
             )
         return compared_laws.elbow, (), compared_laws
     if not compare:

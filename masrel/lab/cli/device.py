@@ -35,6 +35,7 @@ from masrel.lab.conduct._calibrations import (
     last_calibration,
     write_calibration,
 )
+from masrel.lab.conduct._study_log import stated
 from masrel.lab.hess import (
     BackendOptions,
     Clock,
@@ -459,6 +460,7 @@ def _calibrate(
     the masses. With --study the result is written to STUDY/calibrations, and sessions
     use it.
     """
+    who = stated(who=who)["who"]
     if mass_kg and radius_m is None:
         raise click.UsageError("--mass-kg: needs --radius-m")
     if mass_kg and (min(mass_kg) <= 0.0 or len({*mass_kg}) < 2):
@@ -554,25 +556,11 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
     HM1 to HM4 in Table V of Park, Kim and Damiano (2012). Then the loop runs in real
     time on an arm that is held still.
     """
-    hess2012, calibration = StudyPaths(_home() / "hess2012"), None
-    table_v = read_protocol(hess2012.protocol)
-    if study is not None:
-        paths = StudyPaths(study)
-        protocol = read_protocol(paths.protocol)
-        session = _of_study(session, protocol)
-        last = last_calibration(
-            paths, protocol, simulated=not session.options.moves_hardware
-        )
-        calibration = None if last is None else last[0]
-        table_v = msgspec.structs.replace(table_v, device=protocol.device)
-        table_v = calibrated(table_v, calibration)
-    if isinstance(session.options, MoteusOptions):
-        options = dataclasses.replace(session.options, estimates_torque=True)
-        session = dataclasses.replace(session, options=options)
-    present = functools.partial(_presented, session, table_v, calibration)
-    published = hess2012.published_file.read_text("utf-8")
-    rows, stretches, parts = [*csv.DictReader(published.splitlines())], [], []
-    n_parts = math.ceil(minutes)
+    table_v = StudyPaths(_home() / "hess2012")
+    session, protocol, calibration = _for_table_v(session, study, table_v)
+    present = functools.partial(_presented, session, protocol, calibration)
+    rows = [*csv.DictReader(table_v.published_file.read_text("utf-8").splitlines())]
+    stretches, parts, n_parts = [], [], math.ceil(minutes)
     with session.progress(len(rows) + n_parts) as bar:
         for row in rows:
             speed = float(row["mean_speed_deg_s"])
@@ -584,31 +572,58 @@ def _fidelity(session: _Session, study: Path | None, minutes: float) -> None:
         for _ in range(n_parts):
             parts.append(present("HM1", still_s=60.0 * minutes / n_parts))
             bar.update()
-    late = lateness_ms(parts, table_v.device.rate_hz)
-    late_ms = np.percentile(late, (50, 99, 99.9, 100)).tolist()
-    n_missed = sum(int(part.facts["n_missed_ticks"] or 0) for part in parts)
-    faults = [str(part.facts["fault"]) for part in parts if part.facts["fault"]]
     models, compared = compare_models(stretches)
+    late, line = _lateness(parts, protocol.device.rate_hz)
+    faults = [str(part.facts["fault"]) for part in parts if part.facts["fault"]]
     session.write_output(
-        [
-            *compared,
-            "ticks in real time, ms late: median {:.3f}, 99 % {:.3f}, 99.9 % {:.3f}, "
-            "all {:.3f}; missed {} of {}".format(
-                *late_ms, n_missed, n_missed + late.size
-            ),
-            *(f"a minute was stopped: {fault}" for fault in faults),
-        ],
+        [*compared, line, *(f"a minute was stopped: {fault}" for fault in faults)],
         {
             "models": models,
             "stretches": stretches,
             "minutes": minutes,
-            "late_ms": dict(zip(("p50", "p99", "p999", "max"), late_ms, strict=True)),
-            "n_missed_ticks": n_missed,
+            **late,
             "faults": faults,
         },
     )
     if faults:
         sys.exit(1)
+
+
+def _for_table_v(
+    session: _Session, study: Path | None, table_v: StudyPaths
+) -> tuple[_Session, Protocol, Calibration | None]:
+    # the device of STUDY, if there is one, with its calibration, and the published
+    # study's protocol on it
+    protocol, calibration = read_protocol(table_v.protocol), None
+    if study is not None:
+        paths = StudyPaths(study)
+        own = read_protocol(paths.protocol)
+        session = _of_study(session, own)
+        is_simulated = not session.options.moves_hardware
+        last = last_calibration(paths, own, simulated=is_simulated)
+        calibration = None if last is None else last[0]
+        protocol = msgspec.structs.replace(protocol, device=own.device)
+        protocol = calibrated(protocol, calibration)
+    if isinstance(session.options, MoteusOptions):
+        options = dataclasses.replace(session.options, estimates_torque=True)
+        session = dataclasses.replace(session, options=options)
+    return session, protocol, calibration
+
+
+def _lateness(parts: list[Recording], rate_hz: int) -> tuple[dict[str, object], str]:
+    # how late ticks were in real time, as plain values and as a line
+    late = lateness_ms(parts, rate_hz)
+    late_ms = np.percentile(late, (50, 99, 99.9, 100)).tolist()
+    n_missed = sum(int(part.facts["n_missed_ticks"] or 0) for part in parts)
+    shares = dict(zip(("p50", "p99", "p999", "max"), late_ms, strict=True))
+    line = (
+        "ticks in real time, ms late: median {p50:.3f}, 99 % {p99:.3f}, "
+        "99.9 % {p999:.3f}, all {max:.3f}".format(**shares)
+    )
+    return (
+        {"late_ms": shares, "n_missed_ticks": n_missed},
+        f"{line}; missed {n_missed} of {n_missed + late.size}",
+    )
 
 
 def _presented(

@@ -7,6 +7,7 @@ import click
 
 from masrel.cli._options import (
     OutputOptions,
+    level_option,
     output_options,
     split_commas,
     write_output,
@@ -36,13 +37,7 @@ if TYPE_CHECKING:
     help="Use only ratings of these models.",
 )
 @click.option("--session", help="Use only ratings of this session.")
-@click.option(
-    "--level",
-    type=float,
-    default=0.95,
-    show_default=True,
-    help="Level of the intervals.",
-)
+@level_option
 @output_options(
     json='Write JSON to this file; "-" writes it to standard output and prints nothing '
     "else.",

@@ -7,7 +7,12 @@ import click
 
 from masrel._files import write_file
 from masrel.cli._commands import STUDY, Commands
-from masrel.cli._options import OutputOptions, output_options, write_output
+from masrel.cli._options import (
+    OutputOptions,
+    level_option,
+    output_options,
+    write_output,
+)
 from masrel.cli._paths import OutputFile
 from masrel.lab.cli._study_options import (
     clock_option,
@@ -82,13 +87,7 @@ def _show_grade(lesson: "Lesson") -> None:
 @train.command("show")
 @of_study
 @id_option
-@click.option(
-    "--level",
-    type=float,
-    default=0.95,
-    show_default=True,
-    help="Level of the intervals.",
-)
+@level_option
 @click.option(
     "--html",
     "page",

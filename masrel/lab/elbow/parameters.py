@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from masrel._input import refuse
+from masrel.errors import ParameterError
 from masrel.lab.elbow._polynomials import (
     NOTHING,
     Number,
@@ -395,20 +395,16 @@ class ElbowParameters(Law):
     catch_rise: float = _published(0.0, "s", "finite")
 
     def _check_together(self) -> None:
-        refuse(
-            *(
-                (
-                    getattr(self, name) not in (one, other),
-                    f'{name}: needs "{one}" or "{other}", got {getattr(self, name)!r}',
+        for name, (one, other) in READINGS.items():
+            if (value := getattr(self, name)) not in (one, other):
+                raise ParameterError(
+                    f'{name}: needs "{one}" or "{other}", got {value!r}'
                 )
-                for name, (one, other) in READINGS.items()
-            ),
-            (
-                not 0.0 <= self.catch_rise <= self.peak_duration,
+        if not 0.0 <= self.catch_rise <= self.peak_duration:
+            raise ParameterError(
                 f"catch_rise: needs 0 to peak_duration, {self.peak_duration:g} s, "
-                f"got {self.catch_rise:g} s",
-            ),
-        )
+                f"got {self.catch_rise:g} s"
+            )
 
     @property
     def fastest_mean_speed(self) -> float:

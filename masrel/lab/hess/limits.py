@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from masrel._input import refuse
+from masrel.errors import ParameterError
 
 # No elbow is outside, rad; 5 deg because an end stop gives way a little.
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
@@ -43,25 +44,16 @@ _NOT_NEGATIVE = (
 
 def _check_positive(**values: float) -> None:
     """Refuse the first value that is not above 0, and finite."""
-    refuse(
-        *(
-            (
-                not 0.0 < value < math.inf,
-                f"{name}: needs more than 0 and finite, got {value}",
-            )
-            for name, value in values.items()
-        )
-    )
+    for name, value in values.items():
+        if not 0.0 < value < math.inf:
+            raise ParameterError(f"{name}: needs more than 0 and finite, got {value}")
 
 
 def _check_not_negative(**values: float) -> None:
     """Refuse the first value that is not 0 or more, and finite."""
-    refuse(
-        *(
-            (not 0.0 <= value < math.inf, f"{name}: needs 0 or more, got {value}")
-            for name, value in values.items()
-        )
-    )
+    for name, value in values.items():
+        if not 0.0 <= value < math.inf:
+            raise ParameterError(f"{name}: needs 0 or more, got {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,15 +169,12 @@ class DeviceLimits:
     def __post_init__(self) -> None:
         _check_positive(**{name: getattr(self, name) for name in _POSITIVE})
         _check_not_negative(**{name: getattr(self, name) for name in _NOT_NEGATIVE})
+        for name, most in _LONGEST_S.items():
+            value = getattr(self, name)
+            if not 0.0 <= value <= most:
+                raise ParameterError(f"{name}: needs 0 to {most:g} s, got {value}")
         low, high = self.lowest_angle, self.highest_angle
         refuse(
-            *(
-                (
-                    not 0.0 <= getattr(self, name) <= most,
-                    f"{name}: needs 0 to {most:g} s, got {getattr(self, name)}",
-                )
-                for name, most in _LONGEST_S.items()
-            ),
             (
                 not -math.inf < low < high < math.inf,
                 "lowest_angle, highest_angle: need finite angles in this order, "

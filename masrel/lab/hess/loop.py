@@ -18,6 +18,7 @@ from masrel.errors import (
     DeviceTimeoutError,
     LimitExceededError,
     OverrunWarning,
+    ParameterError,
     RecordingWarning,
 )
 from masrel.lab._study_files import Fact
@@ -223,18 +224,16 @@ def _check(
     max_duration_s: float,
     end_angle: float,
 ) -> None:
-    refuse(
-        (
-            rate_hz < 1 or not 0.0 < max_duration_s < math.inf,
+    if rate_hz < 1 or not 0.0 < max_duration_s < math.inf:
+        raise ParameterError(
             "rate_hz, max_duration_s: need more than 0, "
-            f"got {rate_hz} Hz and {max_duration_s} s",
-        ),
+            f"got {rate_hz} Hz and {max_duration_s} s"
+        )
+    refuse(
         (
             not math.isfinite(end_angle),
             f"end_angle: needs a finite angle, got {end_angle} rad",
         ),
-    )
-    refuse(
         (
             limits.watchdog_time * rate_hz < 2.0,
             f"watchdog_time: needs two ticks or more, at {rate_hz} Hz "

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
-from masrel._input import not_utf8, refuse
+from masrel._input import not_utf8
 from masrel.errors import ParameterError, RatingsError
 from masrel.lab._study_files import (
     MAX_SMALL,
@@ -217,23 +217,19 @@ def _records(path: Path, text: str) -> Iterator[list[str]]:
 
 def _columns(path: Path, number: int, record: list[str]) -> list[str]:
     names = [name if "." in name else name.casefold() for name in record]
-    needed = FIRST_COLUMNS[1:]
-    refuse(
-        (
-            not set(needed) <= set(names),
-            f"{path}: row {number}: needed the columns {', '.join(needed)}, got "
-            f"{shortened(', '.join(filter(None, names)))}",
-        ),
-        *(
-            (
-                names.count(name) > 1,
-                f"{path}: row {number}: needed each column once, got {shortened(name)} "
-                "twice",
+    for name in FIRST_COLUMNS[1:]:
+        if name not in names:
+            raise RatingsError(
+                f"{path}: row {number}: needed the columns "
+                f"{', '.join(FIRST_COLUMNS[1:])}, got "
+                f"{shortened(', '.join(filter(None, names)))}"
             )
-            for name in filter(None, names)
-        ),
-        error=RatingsError,
-    )
+    for name in filter(None, names):
+        if names.count(name) > 1:
+            raise RatingsError(
+                f"{path}: row {number}: needed each column once, got {shortened(name)} "
+                "twice"
+            )
     return names
 
 

@@ -143,8 +143,9 @@ def study_conduct(
     if not (study.sessions.is_dir() or study.conduct_logs()):
         return None
     sessions = session_progress(study, protocol)
-    begun = [(s.rater, s.session) for s in sessions if s.last_event is not None]
-    drawn = _read_drawn(study, begun, skips_damaged=True)
+    begun = [session for session in sessions if session.last_event is not None]
+    names = [(session.rater, session.session) for session in begun]
+    drawn = _read_drawn(study, names, skips_damaged=True)
     return StudyConduct(
         sessions=sessions,
         raters=rater_progress(study, protocol, sessions),
@@ -160,9 +161,7 @@ def study_conduct(
         is_of_ratings=bool(begun) and file is None,
         sha256=conduct_hash(study),
         calibration=last_calibration(
-            study,
-            protocol,
-            simulated=all(s.simulated for s in sessions if s.last_event is not None),
+            study, protocol, simulated=all(session.simulated for session in begun)
         ),
         include=frozenset(include),
     )

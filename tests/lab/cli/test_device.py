@@ -212,15 +212,30 @@ def test_the_whole_flow_runs_on_an_emulated_moteus(
 CALIBRATE = ("device", "calibrate", "--device", "simulated", "--who", "Kim")
 
 
-def test_calibrate_does_not_move_an_arm_unasked(masrel: Caller) -> None:
-    done = masrel(*CALIBRATE)
-    assert (done.code, "add --arm-is-free" in done.err) == (2, True)
-    done = masrel(*CALIBRATE, "--arm-is-free", "--mass-kg", "1")
-    assert (done.code, "--mass-kg: needs --radius-m" in done.err) == (2, True)
-    for masses in ("1", "1,1", "0,1", "-1,2"):
-        weights = ("--mass-kg", masses, "--radius-m", "0.25")
-        done = masrel(*CALIBRATE, "--arm-is-free", *weights)
-        assert (done.code, "two different masses or more" in done.err) == (2, True)
+FREE = "--arm-is-free"
+NO_MASSES = "needs two different masses or more, each above 0"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "add --arm-is-free"),
+        ((FREE, "--who", " "), "who: needed text, got none"),
+        ((FREE, "--mass-kg", "1"), "--mass-kg: needs --radius-m"),
+        ((FREE, "--mass-kg", "1", "--radius-m", "0.25"), NO_MASSES),
+        ((FREE, "--mass-kg", "1,1", "--radius-m", "0.25"), NO_MASSES),
+        ((FREE, "--mass-kg", "0,1", "--radius-m", "0.25"), NO_MASSES),
+        ((FREE, "--mass-kg", "-1,2", "--radius-m", "0.25"), NO_MASSES),
+    ],
+)
+def test_calibrate_refuses_before_the_arm_moves(
+    masrel: Caller, arguments: tuple[str, ...], words: str
+) -> None:
+    done = masrel(*CALIBRATE, *arguments)
+    assert (done.code, words in done.err) == (2, True), done.err
+
+
+def test_a_device_without_a_bus_cannot_be_probed(masrel: Caller) -> None:
     done = masrel("device", "probe", "--device", "simulated")
     assert (done.code, "has no bus that can be asked" in done.err) == (2, True)
 

@@ -88,7 +88,7 @@ def test_what_was_measured_on_an_emulator_says_nothing_of_hardware(
         ("2026-11-30T12:00:00Z", "yesterday", "Invalid RFC3339"),
     ],
 )
-def test_a_file_that_is_none_is_refused(
+def test_an_invalid_file_is_refused(
     small: Small, old: str, new: str, words: str
 ) -> None:
     file = write_calibration(small[0], calibration())

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from scipy.signal import detrend, savgol_filter
 
 from masrel.errors import RecordingError
-from masrel.lab.elbow.identification._clusters import Floats, Rows
+from masrel.lab.elbow.identification._clusters import Rows
 from masrel.lab.elbow.identification._reading import (
     MIN_TRAVEL,
     Movement,
     Samples,
     even_samples,
 )
+from masrel.lab.elbow.motions import Floats
 from masrel.lab.elbow.parameters import ElbowParameters
 
 _Ints = NDArray[np.int64]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-Floats = NDArray[np.float64]
+from masrel.lab.elbow.motions import Floats
 
 # Relative to columns of length 1: below it, a column is a combination of the others.
 _RANK_TOLERANCE = 1e-10

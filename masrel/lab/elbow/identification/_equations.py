@@ -25,7 +25,6 @@ from masrel.lab.elbow.identification._catches import Bools, Catch, Law, Part, Tr
 from masrel.lab.elbow.identification._clusters import (
     ClusteredFit,
     FittedParameter,
-    Floats,
     Rows,
     Step,
     left_out_steps,
@@ -33,6 +32,7 @@ from masrel.lab.elbow.identification._clusters import (
     solve,
     triangle,
 )
+from masrel.lab.elbow.motions import Floats
 
 # What a trial's torque is linear in, in the order of the design matrix's columns, and
 # what it is differentiated by numerically, in steps of so many seconds.

@@ -16,7 +16,6 @@ from masrel.errors import RecordingError, RecordingWarning
 from masrel.lab.elbow.identification._catches import Part, filtered_part, window_length
 from masrel.lab.elbow.identification._clusters import (
     FittedParameter,
-    Floats,
     Rows,
     fitted,
     solve,
@@ -26,6 +25,7 @@ from masrel.lab.elbow.identification._reading import (
     even_samples,
     read_movement,
 )
+from masrel.lab.elbow.motions import Floats
 
 # Slower, the direction of motion is not certain and the device may stick, rad/s.
 _MOVING = math.radians(5.0)

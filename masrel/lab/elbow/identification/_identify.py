@@ -44,7 +44,6 @@ from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
     ClusteredFit,
     FittedParameter,
-    Floats,
     Step,
     fitted,
 )
@@ -75,6 +74,7 @@ from masrel.lab.elbow.identification._rounds import (
     fitted_law,
     untimed_terms,
 )
+from masrel.lab.elbow.motions import Floats
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 
 # Options of `fit` that are tried in a comparison, each alone.

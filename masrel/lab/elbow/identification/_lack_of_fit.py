@@ -16,8 +16,9 @@ import numpy as np
 from scipy.special import fdtrc, stdtr
 
 from masrel.lab.elbow.identification._catches import Part
-from masrel.lab.elbow.identification._clusters import Floats, Rows, partial_out, solve
+from masrel.lab.elbow.identification._clusters import Rows, partial_out, solve
 from masrel.lab.elbow.identification._equations import LINEAR, Equations, JointFit
+from masrel.lab.elbow.motions import Floats
 
 # Of all tests together: how often a fit of the right law is called a wrong one.
 LEVEL = 0.02

@@ -8,7 +8,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import compress, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +22,6 @@ from masrel.lab.elbow._torque import torque
 from masrel.lab.elbow.identification._catches import Law, Part, differentiate
 from masrel.lab.elbow.identification._clusters import (
     FittedParameter,
-    Floats,
     Rows,
     fitted,
     solve,
@@ -38,7 +37,7 @@ from masrel.lab.elbow.identification._reading import (
     even_samples,
     read_movement,
 )
-from masrel.lab.elbow.motions import Recorded
+from masrel.lab.elbow.motions import Floats, Recorded
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.lab.elbow.tone import (
     ClaspKnife,
@@ -299,7 +298,7 @@ def compare_laws(
     recordings: Sequence[Movement | Path | str],
     *,
     laws: Sequence[str] | None = None,
-    progress: Callable[[], object] = lambda: None,
+    progress: Callable[[int, int], object] = lambda _made, _all: None,
     **options: Any,
 ) -> LawComparison:
     """Fit laws of tone beside the elbow's, and predict each recording from the others.
@@ -311,7 +310,7 @@ def compare_laws(
     laws : sequence of str, optional
         Which of `LAWS`, and of those that cannot be fitted; all by default.
     progress : callable, optional
-        Called after each law, the elbow's first.
+        Called after each law with how many are fitted, and how many there are.
     **options
         Those of `fit`. Weight and inertia of the arm, fitted or fixed, count for every
         law; what else an arm has for the elbow's alone.
@@ -350,7 +349,7 @@ def compare_laws(
     )
     binned = [_binned(movement, options) for movement in movements]
     elbow, first = _elbow_fit(movements, binned, options)
-    progress()
+    progress(1, 1 + len(names))
     nothing, fits = np.full(len(binned), math.nan), [first]
     for name in names:
         fits.append(
@@ -358,7 +357,7 @@ def compare_laws(
             if name in UNFITTED
             else _law_fit(name, binned, options)
         )
-        progress()
+        progress(len(fits), 1 + len(names))
     worse, ses = against_best(np.array([each.squares for each in fits]))[1:]
     return LawComparison(
         fits=tuple(fits),
@@ -433,58 +432,73 @@ def _elbow_left(made: ElbowFit, each: _Binned) -> float:
     return float(left @ left)
 
 
-def _law_fit(
-    name: str, binned: Sequence[_Binned], options: Mapping[str, Any]
-) -> LawFit:
-    row, terms = LAWS[name], [options.get(term, "off") for term in _ARM]
-    fits = [term == "fitted" for term in terms]
-    fixed = np.array([0.0 if isinstance(term, str) else term for term in terms])
-    names = (
-        *row.free,
-        *(arm for arm, is_free in zip(_ARM, fits, strict=True) if is_free),
-    )
-    quantities = row.law.quantities()
-    low, high = np.array(
-        [_BOUNDS[quantities[each].needs] for each in row.free]
-        + [(-math.inf, math.inf)] * sum(fits)
-    ).T
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _LawOfArm:
+    """A law of tone and the terms of an arm, and how they are fitted together."""
 
-    def left(x: Floats, each: _Binned) -> Floats:
-        joint, arm = row.made(x[: len(row.free)].tolist()), fixed.copy()
-        arm[fits] = x[len(row.free) :]
-        return each.left(joint.torque(each.motion, each.times), arm)
+    row: FittableLaw
+    fixed: Floats  # (n_terms,) of the arm; 0 for one that is fitted, or off
+    fits: NDArray[np.bool_]  # (n_terms,)
 
-    def residuals(x: Floats, those: Sequence[_Binned]) -> Floats:
-        return np.concatenate([left(x, each) for each in those])
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.row.free, *compress(_ARM, self.fits))
+
+    def left(self, x: Floats, each: _Binned) -> Floats:
+        n, arm = len(self.row.free), self.fixed.copy()
+        arm[self.fits] = x[n:]
+        torques = self.row.made(x[:n].tolist()).torque(each.motion, each.times)
+        return each.left(torques, arm)
+
+    def all_left(self, x: Floats, binned: Sequence[_Binned]) -> Floats:
+        return np.concatenate([self.left(x, each) for each in binned])
 
     def search(
-        start: Floats, most: int, those: Sequence[_Binned] = binned
+        self, binned: Sequence[_Binned], start: Floats, most: int
     ) -> OptimizeResult:
+        quantities = self.row.law.quantities()
+        bounds = [_BOUNDS[quantities[name].needs] for name in self.row.free]
+        bounds += [(-math.inf, math.inf)] * int(self.fits.sum())
         return least_squares(
-            residuals,
+            self.all_left,
             start,
-            args=(those,),
-            bounds=(low, high),
+            args=(binned,),
+            bounds=tuple(np.array(bounds).T),
             x_scale="jac",
             max_nfev=most,
             ftol=_PRECISE,
             xtol=_PRECISE,
         )
 
-    starts = [np.append(start, np.zeros(sum(fits))) for start in _starts(row, binned)]
-    tried = [search(start, _TRIED) for start in starts]
-    best = search(min(tried, key=lambda each: float(each.cost)).x, _EVALUATIONS)
+    def best(self, binned: Sequence[_Binned]) -> OptimizeResult:
+        of_arm = np.zeros(int(self.fits.sum()))
+        starts = (np.append(start, of_arm) for start in _starts(self.row, binned))
+        tried = [self.search(binned, start, _TRIED) for start in starts]
+        nearest = min(tried, key=lambda each: float(each.cost))
+        return self.search(binned, nearest.x, _EVALUATIONS)
+
+
+def _law_fit(
+    name: str, binned: Sequence[_Binned], options: Mapping[str, Any]
+) -> LawFit:
+    terms = [options.get(term, "off") for term in _ARM]
+    law = _LawOfArm(
+        row=LAWS[name],
+        fixed=np.array([0.0 if isinstance(term, str) else term for term in terms]),
+        fits=np.array([term == "fitted" for term in terms]),
+    )
+    best = law.best(binned)
     # what is at an end of its range moves no more, and the others beside it
     is_free = best.active_mask == 0
     cuts = np.cumsum([each.torque.size for each in binned])[:-1]
     pairs = zip(np.split(best.jac, cuts), np.split(best.fun, cuts), strict=True)
     rows = [Rows(-slopes * is_free, residuals) for slopes, residuals in pairs]
-    estimates = _estimates(names, best.x, is_free, rows, options, row.needs)
+    estimates = _estimates(law.names, best.x, is_free, rows, options, law.row.needs)
     lone = [e for e in estimates if e.n_trials < 2]
     squares = np.full(len(binned), math.nan)
     for i, each in enumerate(binned) if not lone else ():
-        rest = search(best.x, _AGAIN, [*binned[:i], *binned[i + 1 :]])
-        error = left(rest.x, each)
+        rest = law.search([*binned[:i], *binned[i + 1 :]], best.x, _AGAIN)
+        error = law.left(rest.x, each)
         squares[i] = error @ error
     return LawFit(
         name=name,

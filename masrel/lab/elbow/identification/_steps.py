@@ -28,7 +28,6 @@ from masrel.lab.elbow.identification._catches import (
 from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
     FittedParameter,
-    Floats,
     Rows,
     Step,
     fitted,
@@ -39,6 +38,7 @@ from masrel.lab.elbow.identification._equations import (
     line_row,
     mills,
 )
+from masrel.lab.elbow.motions import Floats
 from masrel.lab.elbow.parameters import ElbowParameters
 
 # Mean speeds must span this, rad/s: less is one speed, which has no slope.

@@ -101,19 +101,15 @@ class PropertyTable:
 
     def __post_init__(self) -> None:
         absent = [name for name in REQUIRED if name not in self.numbers]
-        refuse(
-            *(
-                (
-                    type(number) is not int or not _LOWEST <= number <= _HIGHEST,
-                    f"properties.{name}: needs {_LOWEST} to {_HIGHEST}, got "
-                    f"{number!r}; 0 to 7 are the same for every firmware",
-                )
-                for name, number in self.numbers.items()
-            ),
-            (absent, f"properties: need {', '.join(absent)} too"),
-        )
+        if absent:
+            raise ParameterError(f"properties: need {', '.join(absent)} too")
         taken: dict[int, str] = {}
         for name, number in self.numbers.items():
+            if type(number) is not int or not _LOWEST <= number <= _HIGHEST:
+                raise ParameterError(
+                    f"properties.{name}: needs {_LOWEST} to {_HIGHEST}, got "
+                    f"{number!r}; 0 to 7 are the same for every firmware"
+                )
             for used in (number, number + 1) if name in _WIDE else (number,):
                 if used in taken:
                     raise ParameterError(
