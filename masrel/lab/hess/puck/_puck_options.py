@@ -100,9 +100,6 @@ class PropertyTable:
     numbers: Mapping[str, int]
 
     def __post_init__(self) -> None:
-        absent = [name for name in REQUIRED if name not in self.numbers]
-        if absent:
-            raise ParameterError(f"properties: need {', '.join(absent)} too")
         taken: dict[int, str] = {}
         for name, number in self.numbers.items():
             if type(number) is not int or not _LOWEST <= number <= _HIGHEST:
@@ -117,6 +114,9 @@ class PropertyTable:
                         f"{used} is taken by {taken[used]}"
                     )
                 taken[used] = name
+        absent = [name for name in REQUIRED if name not in self.numbers]
+        if absent:
+            raise ParameterError(f"properties: need {', '.join(absent)} too")
 
     def number(self, name: str) -> int:
         """Return the number of a property.
