@@ -597,12 +597,12 @@ def _for_table_v(
     protocol, calibration = read_protocol(table_v.protocol), None
     if study is not None:
         paths = StudyPaths(study)
-        own = read_protocol(paths.protocol)
-        session = _of_study(session, own)
+        of_study = read_protocol(paths.protocol)
+        session = _of_study(session, of_study)
         is_simulated = not session.options.moves_hardware
-        last = last_calibration(paths, own, simulated=is_simulated)
+        last = last_calibration(paths, of_study, simulated=is_simulated)
         calibration = None if last is None else last[0]
-        protocol = msgspec.structs.replace(protocol, device=own.device)
+        protocol = msgspec.structs.replace(protocol, device=of_study.device)
         protocol = calibrated(protocol, calibration)
     if isinstance(session.options, MoteusOptions):
         options = dataclasses.replace(session.options, estimates_torque=True)
