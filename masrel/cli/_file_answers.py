@@ -239,7 +239,9 @@ def _show_answers(
                 "--order, --by: needed one of them, got both",
             )
         )
-        reading = replace(reading, stream=False, by=judging.order or reading.by)
+        known = (*judging.judges, *(judging.humans or ()))
+        by = judging.order or reading.by
+        reading = replace(reading, stream=False, by=by, known=known)
     ratings = read_file(file, reading)
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers

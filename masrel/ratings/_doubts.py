@@ -238,7 +238,7 @@ def _no_raters(
     names = [sheet.header[place] for place in layout.raters]
     named = _called_otherwise(sheet, layout)
     alone, sure = _alone(codes, scale, freq)
-    vouched = {k for k, name in enumerate(names) if name == options.reference}
+    vouched = {k for k, name in enumerate(names) if name in options.vouched}
     wrong = (named | sure) - vouched
     if not named:
         _refuse_criteria(sheet, names, {names[k] for k in sure})
@@ -278,7 +278,7 @@ def refuse_named(sheet: Sheet, layout: Layout, options: Reading) -> None:
         return
     called = sorted(_called_otherwise(sheet, layout))
     names = [sheet.header[layout.raters[k]] for k in called]
-    if wrong := [name for name in names if name != options.reference]:
+    if wrong := [name for name in names if name not in options.vouched]:
         raise sheet.refuse(
             "no raters",
             columns=listed(wrong, _SHOWN),

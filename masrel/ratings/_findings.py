@@ -38,6 +38,8 @@ class Reading:
         Columns of a wide table that are raters, and columns that are left aside.
     reference : str or None
         The rater to compare the others with, whatever the column is called.
+    known : tuple of str
+        Other names that are those of raters, whatever their columns are called.
     no_item, no_header : bool
         Whether no column names the items; whether the first line is a row.
     skip : int
@@ -99,6 +101,7 @@ class Reading:
     raters: str | tuple[str, ...] = ()
     ignore: str | tuple[str, ...] = ()
     reference: str | None = None
+    known: tuple[str, ...] = ()
     no_item: bool = False
     no_header: bool = False
     skip: int = 0
@@ -144,6 +147,11 @@ class Reading:
             for name, value in values.items()
             if value != getattr(Reading(), name)
         }
+
+    @property
+    def vouched(self) -> set[str | None]:
+        """Names that are those of raters."""
+        return {self.reference, *self.known}
 
     @property
     def whole(self) -> list[str]:

@@ -119,12 +119,14 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
     # the corner of a transposed table names its rows, which are now its columns
     is_wide = is_counted or "raters" in named or options.no_item or bool(often)
     is_wide |= sheet.is_transposed and not {"rater", "grade"} & named.keys()
+    # columns of raters, whose names may be usual ones of something else
+    known = {k for k, name in enumerate(sheet.header) if name in options.vouched}
     layout = None
     if options.by_criterion:
         layout = _of_criteria(sheet, options, item, taken)
     elif not is_wide:
-        layout = _long(sheet, options, named, taken)
-    layout = layout or _wide(sheet, options, named, taken)
+        layout = _long(sheet, options, named, taken | known)
+    layout = layout or _wide(sheet, options, named, taken, known)
     roles = (layout.item, layout.raters, layout.grades, session, by, clusters, often)
     _refuse_names(sheet, set().union(*roles))
     first: dict[str, Any] = {role: named[role][0] for role in _ROLES if role in named}
@@ -273,13 +275,14 @@ def _wide(
     options: Reading,
     named: dict[str, tuple[int, ...]],
     taken: set[int],
+    known: set[int],
 ) -> Layout:
     # a wide table, or one of counts
     kind: Kind = "counts" if options.counts else "table" if options.table else "wide"
     item, raters, is_guessed = named.get("item", ()), named.get("raters", ()), False
     places = range(len(sheet.header))
     if not item and not options.no_item:
-        others = taken.union(raters)
+        others = taken.union(raters, known, _models(sheet))
         usual = () if kind == "table" else _usual(sheet, "item", others)
         item = usual or tuple([place for place in places if place not in others][:1])
         is_guessed = bool(item) and not usual and "frequency" not in named
@@ -296,6 +299,25 @@ def _wide(
     return Layout(
         kind=kind, item=item, raters=raters, grades=raters, is_item_guessed=is_guessed
     )
+
+
+def _models(sheet: Sheet) -> set[int]:
+    # columns of models that rated, not of those that were rated: they have the grades
+    # of the others, while the first column names the rows
+    if not names_rows(sheet, 0):
+        return set()
+    n_rows, columns = len(sheet.numbers), sheet.columns
+    return {
+        place
+        for place, name in enumerate(sheet.header[1:], start=1)
+        if name.casefold() == "model" and len(columns[place].texts) < n_rows
+        if {*columns[place].texts}.issubset(
+            text
+            for k, column in enumerate(columns)
+            if k not in (0, place)
+            for text in column.texts
+        )
+    }
 
 
 def _refuse_comments(sheet: Sheet, raters: Sequence[int]) -> None:

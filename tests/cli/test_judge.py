@@ -128,6 +128,16 @@ def test_named_humans_are_all_there_are(masrel: Caller, file: Path) -> None:
     assert [row["human"] for row in document(masrel, *call)["humans"]] == ["Kim", "Lee"]
 
 
+@pytest.mark.parametrize("name", ["model", "judge"])
+def test_a_judge_may_be_called_as_other_columns_are(
+    masrel: Caller, tmp_path: Path, name: str
+) -> None:
+    rows = [{name if k == "large" else k: v for k, v in of.items()} for of in ROWS]
+    call = (written(tmp_path, rows), "--judge", name, *EXPERT, "--ignore", "small")
+    (row,) = document(masrel, *call)["judges"]
+    assert (row["judge"], row["n_humans"]) == (name, 3)
+
+
 def test_a_score_by_weights_of_ordered_grades(masrel: Caller, file: Path) -> None:
     call = (file, "--judge", "large", *EXPERT, "--categories", "fail,pass")
     scores = {
