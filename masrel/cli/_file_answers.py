@@ -239,10 +239,9 @@ def _show_answers(
                 "--order, --by: needed one of them, got both",
             )
         )
-        known = (*judging.judges, *(judging.humans or ()))
-        by = judging.order or reading.by
-        reading = replace(reading, stream=False, by=by, known=known)
-    ratings = read_file(file, reading)
+        reading = replace(reading, stream=False, by=judging.order or reading.by)
+    known = () if judging is None else (*judging.judges, *(judging.humans or ()))
+    ratings = read_file(file, replace(reading, known=known))
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers
     from masrel.pages._answer_page import answer_page
