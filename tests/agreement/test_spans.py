@@ -229,14 +229,14 @@ def test_nothing_to_compare_is_undefined() -> None:
 
 
 @pytest.mark.slow
-def test_half_a_million_spans_take_seconds() -> None:
+def test_a_hundred_thousand_spans_take_two_seconds() -> None:
     rng, rows = np.random.default_rng(1), list[Row]()
-    for document in range(1000):
+    for document in range(200):
         for who in range(5):
             begins = np.sort(rng.choice(2000, 100, replace=False)) * 100
             sizes, labels = rng.integers(1, 100, 100), rng.integers(0, 8, 100)
             columns = zip(labels.tolist(), begins.tolist(), sizes.tolist(), strict=True)
             rows += [(document, who, *of) for of in columns]
     start = time.process_time()
-    unitizing_alpha(rows, length=dict.fromkeys(range(1000), 200_000))
-    assert time.process_time() - start < 10.0
+    unitizing_alpha(rows, length=dict.fromkeys(range(200), 200_000))
+    assert time.process_time() - start < 2.0

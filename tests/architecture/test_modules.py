@@ -18,7 +18,9 @@ def _name(file: Path) -> str:
 FILES = {_name(file).removesuffix(".__init__"): file for file in ROOT.rglob("*.py")}
 
 
-TREES = {name: ast.parse(file.read_text("utf-8")) for name, file in FILES.items()}
+@cache
+def _tree(module: str) -> ast.Module:
+    return ast.parse(FILES[module].read_text("utf-8"))
 
 
 def _nodes(tree: ast.AST, types: bool) -> Iterator[ast.AST]:
@@ -39,7 +41,7 @@ def imported(module: str, *, lazy: bool) -> frozenset[str]:
     ``__init__`` imports them for type checkers.
     """
     is_package, found = FILES[module].name == "__init__.py", set()
-    for node in _nodes(TREES[module], lazy and is_package):
+    for node in _nodes(_tree(module), lazy and is_package):
         if isinstance(node, ast.ImportFrom) and node.module:
             names = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= (names & FILES.keys()) or {node.module}
@@ -117,5 +119,5 @@ def writes(tree: ast.AST) -> Iterator[int]:
 
 def test_no_other_module_writes_files() -> None:
     places = {name: str(file.relative_to(ROOT)) for name, file in FILES.items()}
-    lines = {places[name]: list(writes(tree)) for name, tree in TREES.items()}
+    lines = {places[name]: list(writes(_tree(name))) for name in FILES}
     assert {of: at for of, at in lines.items() if at and of not in WRITERS} == {}

@@ -41,9 +41,9 @@ def test_every_cell_has_a_row(name: str) -> None:
     ("name", "every", "size"),
     [
         ("coverage", 90, 40),
-        ("limits_coverage", 9, 300),
+        ("limits_coverage", 9, 100),
         ("judges_rates", 9, 4000),
-        ("resampling", 6, 40),
+        ("resampling", 6, 20),
         pytest.param("coverage", 9, 300, marks=LONG),
         pytest.param("resampling", 1, 200, marks=LONG),
     ],

@@ -1,5 +1,6 @@
 """Small studies: the published one, and hand-made ratings under its protocol."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ Row = tuple[str, str, str, str | None]
 """Session, rater, model, grade."""
 
 
+@cache
 def hess2012() -> Protocol:
     return read_protocol(STUDY / "protocol.toml")
 

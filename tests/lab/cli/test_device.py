@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import shutil
 import signal
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from masrel.lab.hess import run_presentation
 from masrel.lab.hess.puck import steady_runs
 from tests.cli.process import Caller
 
+HESS2012 = Path(__file__).parents[3] / "studies" / "hess2012"
 EMULATED = ("--channel", "cli", "--emulate")
 CHECK = ("device", "check", *EMULATED)
 MIRRORED = ("--direction", -1, "--gear-ratio", 9.4)
@@ -243,10 +245,16 @@ def test_a_device_without_a_bus_cannot_be_probed(masrel: Caller) -> None:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")  # a busy machine
 @pytest.mark.parametrize(
-    ("device", "against"), [("moteus", "weights"), ("simulated", "a torque sensor")]
+    ("device", "against", "n_stretches"),
+    [("moteus", "weights", 4), ("simulated", "a torque sensor", 32)],
 )
 def test_a_device_of_a_study_is_calibrated_and_its_torque_compared(
-    masrel: Caller, tmp_path: Path, device: str, against: str
+    masrel: Caller,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    device: str,
+    against: str,
+    n_stretches: int,
 ) -> None:
     study = tmp_path / "study"
     masrel("init", study)
@@ -270,8 +278,14 @@ def test_a_device_of_a_study_is_calibrated_and_its_torque_compared(
     assert json.loads(file.read_text("utf-8"))["values"] == document["values"]
     if device == "moteus":
         assert document["boards"][0]["serial"] == "00001267-00000000-00000000"
+    table_v = Path(shutil.copytree(HESS2012, tmp_path / "home" / "hess2012"))
+    rows = table_v / "ratings/published.csv"
+    head = rows.read_text("utf-8").splitlines()[: 1 + n_stretches]
+    rows.write_text("\n".join(head), encoding="utf-8")
+    module = importlib.import_module("masrel.lab.cli.device")
+    monkeypatch.setattr(module, "_home", lambda: tmp_path / "home")
     done = masrel("device", "fidelity", "--study", study, "--json", "-")
     document = json.loads(done.out)
     assert set(document["models"]) == {"HM1", "HM2", "HM3", "HM4"}
-    assert len(document["stretches"]) == 32
+    assert len(document["stretches"]) == n_stretches
     assert document["simulated"] is True

@@ -354,8 +354,8 @@ def traced(prepared: Prepared, tmp_path: Path) -> Callable[[str], Traced]:
 
 
 def some(syscalls: list[Syscall], share: float) -> list[Syscall]:
-    """Return a seeded share of them, four at most, or all."""
-    n = len(syscalls) if share == 1 else min(4, math.ceil(share * len(syscalls)))
+    """Return a seeded share of them, two at most, or all."""
+    n = len(syscalls) if share == 1 else min(2, math.ceil(share * len(syscalls)))
     return Random(11).sample(syscalls, n)
 
 

@@ -93,7 +93,7 @@ def test_two_builds_at_once_leave_one_whole_report(study: Path, tmp_path: Path) 
     for call in calls:
         assert built(call) == [0]
         needed.append(contents(folder))
-    for number in range(3):
+    for number in range(2):
         if number == 0:
             shutil.rmtree(cache)
         shutil.rmtree(folder)

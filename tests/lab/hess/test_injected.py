@@ -270,11 +270,11 @@ WARM_UP = 50  # presentations in which caches and pools fill
 MAX_GROWTH_KB = 4096  # in an hour a leak of one recording in ten would be 17 MB
 
 
-# In six minutes the same bound sees a leak of a recording in four.
+# In three minutes the same bound sees a leak of a recording in two.
 @pytest.mark.parametrize(
     ("simulated_minutes", "min_presentations"),
     [
-        pytest.param(6, 200, marks=pytest.mark.slow),
+        pytest.param(3, 100, marks=pytest.mark.slow),
         pytest.param(60, 2000, marks=pytest.mark.long),
     ],
 )

@@ -267,7 +267,7 @@ def assert_no_catch_ends_at_once(presented: Presented) -> None:
     [
         (20, 1),
         (5, 3),
-        pytest.param(150, 3, marks=pytest.mark.slow),
+        pytest.param(50, 3, marks=pytest.mark.slow),
         pytest.param(10_000, 1, marks=pytest.mark.long),
         pytest.param(10_000, 3, marks=pytest.mark.long),
     ],

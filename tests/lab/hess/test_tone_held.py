@@ -278,8 +278,8 @@ def test_clonus_beats_as_long_as_even_a_soft_hand_holds_it() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", GUARDED)
-def test_three_hands_that_let_go_are_told_from_three_that_hold(kind: str) -> None:
-    assert_held([outcome(rater) for rater in raters(kind, range(3))])
+def test_a_hand_that_lets_go_is_told_from_one_that_holds(kind: str) -> None:
+    assert_held([outcome(rater) for rater in raters(kind, [0])])
 
 
 @pytest.mark.long

@@ -211,7 +211,7 @@ FREE = ("[schedule]", '[presentation]\nstretches = "free"\n\n[schedule]')
 @pytest.mark.parametrize(
     "n_kills",
     [
-        pytest.param(14, marks=pytest.mark.slow),
+        pytest.param(7, marks=pytest.mark.slow),
         pytest.param(300, marks=[pytest.mark.long, pytest.mark.faults]),
     ],
 )

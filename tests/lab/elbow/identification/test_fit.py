@@ -276,8 +276,8 @@ def test_recordings_without_a_stretch_are_left_out_or_refused() -> None:
 
 # 5 studies of 8 parameters: at 95 % coverage 2 of 40 miss on average. Were they
 # independent, 8 or more would miss once in 1000 times. 200 studies: an interval of true
-# coverage 95 % is within 180 to 196 but once in 200 times; 10 studies: at least 7 but
-# once in 900. Seeds are fixed, so that this is a statement about the method.
+# coverage 95 % is within 180 to 196 but once in 200 times. Seeds are fixed, so that
+# this is a statement about the method.
 CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "scattered": (HM3, {"scatter": SCATTER}),
     "exact": (HM3, {}),
@@ -295,7 +295,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     ("case", "n", "fewest", "most_missed"),
     [
         ("scattered", 5, 2, 7),
-        *(pytest.param(c, 10, 7, 80, marks=pytest.mark.slow) for c in CASES),
+        pytest.param("outlasting", 5, 2, 7, marks=pytest.mark.slow),
         *(pytest.param(c, 200, 180, 1600, marks=pytest.mark.long) for c in CASES),
     ],
 )

@@ -260,7 +260,7 @@ def counts(case: dict[str, object], seeds: range, **options: object) -> Counter[
 
 # 40 seeds: of intervals that hold 95 %, fewer than 34 hold once in 70 000 times.
 COVERED = [
-    pytest.param(2, 1, marks=pytest.mark.slow),
+    pytest.param(1, 1, marks=pytest.mark.slow),
     pytest.param(40, 34, marks=pytest.mark.long),
 ]
 

@@ -52,7 +52,7 @@ TRUE: dict[str, JointModel] = {
     "clonus": Clonus(),
     "spastic-elbow": STANDARD_MODELS["HM3"],
 }
-SLOW = ("threshold-stretch-reflex", "clonus")  # the others are by hand
+SLOW = ("clonus",)  # the others are by hand
 
 
 def recordings(joint: JointModel, seed: int, *, n: int = 6) -> list[Movement]:

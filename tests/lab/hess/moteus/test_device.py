@@ -175,7 +175,7 @@ def test_a_free_arm_says_its_friction() -> None:
     "numbers",
     [
         range(2),
-        pytest.param(range(2, 20), marks=pytest.mark.slow),
+        pytest.param(range(2, 8), marks=pytest.mark.slow),
         *(
             pytest.param(range(first, first + 500), marks=pytest.mark.long)
             for first in range(0, 10_000, 500)

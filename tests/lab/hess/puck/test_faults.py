@@ -295,15 +295,15 @@ def assert_invariants(faults: tuple[InjectedFault, ...]) -> None:
 
 
 few = settings(deadline=None, max_examples=8)
-thirty = settings(few, max_examples=30, suppress_health_check=[HealthCheck.too_slow])
+many = settings(few, max_examples=16, suppress_health_check=[HealthCheck.too_slow])
 
 
 @pytest.mark.parametrize(
     "count",
     [
         few,
-        pytest.param(thirty, marks=pytest.mark.slow),
-        pytest.param(settings(thirty, max_examples=1000), marks=pytest.mark.long),
+        pytest.param(many, marks=pytest.mark.slow),
+        pytest.param(settings(many, max_examples=1000), marks=pytest.mark.long),
     ],
     ids=lambda count: str(count.max_examples),
 )

@@ -39,7 +39,7 @@ def is_over(stage: Stage) -> bool:
 
 @pytest.mark.parametrize(
     "kills",
-    [pytest.param(5, marks=pytest.mark.slow), pytest.param(50, marks=pytest.mark.long)],
+    [pytest.param(2, marks=pytest.mark.slow), pytest.param(50, marks=pytest.mark.long)],
 )
 def test_no_grade_is_lost_or_doubled_where_browsers_are_killed(
     playwright: Playwright, make_stage: MakeStage, kills: int
