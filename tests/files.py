@@ -25,6 +25,13 @@ def edit(file: Path, old: str, new: str, times: int = -1) -> None:
     file.write_text(text.replace(old, new, times), encoding="utf-8")
 
 
+def small_study(root: Path) -> Path:
+    """The template "small", whose raters stretch the arm once, which is soon done."""
+    copy_template("small", root)
+    edit(root / "protocol.toml", 'stretches = "free"', "stretches = 1")
+    return root
+
+
 def published_study(root: Path, plan: str) -> Path:
     """The published study, of which somebody else has planned the analysis."""
     copy_template("hess2012", root)  # nothing that somebody left in the clone

@@ -54,24 +54,17 @@ LOADS_NO: dict[str, set[str]] = {
             "from masrel.cli import cli\ncli(['--version'])",
         )
     },
-    **{
-        f"import masrel.{name}": HEAVY
-        for name in (
-            *("agreement", "intervals", "lab.elbow", "lab.hess"),
-            *("lab.protocol", "lab.schedule", "lab.run"),  # before the ratings
-        )
-    },
-    **{
-        f"import numpy\nfrom masrel.agreement import {name}\n"
-        f"{name}(numpy.array([[1, 1], [1, 2], [2, 2]]), weights='quadratic')": (
-            HEAVY | {"click", "msgspec", "masrel.intervals"}
-        )
-        for name in ("fleiss_kappa", "gwet_ac", "cohen_kappa")
-    },
-    **{
-        f"from masrel.cli import cli\ncli([{group!r}, '--help'])": HEAVY
-        for group in OF_GROUPS
-    },
+    # of the laboratory what comes before the ratings
+    "import masrel.agreement, masrel.intervals, masrel.lab.elbow, masrel.lab.hess\n"
+    "import masrel.lab.protocol, masrel.lab.schedule, masrel.lab.run": HEAVY,
+    "import numpy, masrel.agreement as m\n"
+    "for kappa in (m.fleiss_kappa, m.gwet_ac, m.cohen_kappa):\n"
+    "    kappa(numpy.array([[1, 1], [1, 2], [2, 2]]), weights='quadratic')": (
+        HEAVY | {"click", "msgspec", "masrel.intervals"}
+    ),
+    "from masrel.cli import cli\n"
+    f"for group in {OF_GROUPS}:\n"
+    "    cli([group, '--help'], standalone_mode=False)": HEAVY,
     "import masrel.lab.analysis, masrel.ratings": {"matplotlib", "emcee"},
     "import masrel, pandas as pd\n"
     "masrel.agree(pd.DataFrame({'item': [1, 2], 'K': [1, 2], 'L': [1, 1]}))": {

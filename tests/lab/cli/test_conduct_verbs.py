@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.lab.protocol import StudyPaths, copy_template
-from tests.files import edit
+from masrel.lab.protocol import StudyPaths
+from tests.files import edit, small_study
 
 FIELDS = """
 [rater_fields.years]
@@ -23,7 +23,7 @@ unit = "years"
 @pytest.fixture
 def study(tmp_path: Path) -> StudyPaths:
     paths = StudyPaths(tmp_path / "study")
-    copy_template("small", paths.root)
+    small_study(paths.root)
     edit(paths.protocol, "\n[[sessions]]", FIELDS, 1)
     return paths
 

@@ -246,7 +246,7 @@ def test_a_device_without_a_bus_cannot_be_probed(masrel: Caller) -> None:
 @pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")  # a busy machine
 @pytest.mark.parametrize(
     ("device", "against", "n_stretches"),
-    [("moteus", "weights", 4), ("simulated", "a torque sensor", 32)],
+    [("moteus", "weights", 8), ("simulated", "a torque sensor", 32)],
 )
 def test_a_device_of_a_study_is_calibrated_and_its_torque_compared(
     masrel: Caller,

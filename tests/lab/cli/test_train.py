@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from masrel.agreement import cohen_kappa
-from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs
 from masrel.lab.run import SimulatedGrades, read_log, run_session
 from masrel.lab.schedule import write_schedules
@@ -20,7 +20,7 @@ from masrel.lab.training import (
     train_rater,
 )
 from tests.cli.process import Caller
-from tests.files import edit
+from tests.files import edit, small_study
 from tests.lab.run.kill_at import die_at_line
 
 # A test that few presentations decide
@@ -35,7 +35,7 @@ max_presentations = 32
 
 
 def new_study(root: Path) -> Path:
-    copy_template("small", root)
+    small_study(root)
     with (root / "protocol.toml").open("a", encoding="utf-8") as file:
         file.write(RULES)
     return root

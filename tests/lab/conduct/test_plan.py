@@ -19,7 +19,7 @@ from masrel.lab.protocol import (
 from masrel.lab.ratings import study_remarks
 from masrel.lab.run import read_log
 from masrel.lab.verification import verify_study
-from tests.files import edit
+from tests.files import edit, small_study
 from tests.lab.flow.conftest import run
 
 KAPPA = "analysis.estimates.kappa.coefficient"
@@ -32,7 +32,7 @@ def draw(study: StudyPaths) -> None:
 @pytest.fixture
 def study(tmp_path: Path) -> StudyPaths:
     """The small template, its schedules drawn."""
-    copy_template("small", tmp_path / "study")
+    small_study(tmp_path / "study")
     paths = StudyPaths(tmp_path / "study")
     draw(paths)
     return paths

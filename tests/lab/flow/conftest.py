@@ -10,7 +10,9 @@ from masrel.cli import cli
 from masrel.lab.conduct import record_standing
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.run import SimulatedGrades, run_session
+from tests.files import edit
 from tests.lab.cli.test_train import new_study, train_simulated
+from tests.lab.schedule.studies import with_secret
 
 
 def run(*arguments: str, code: int = 0) -> str:
@@ -31,17 +33,20 @@ def small_demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def whole(small_demo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study with every file that a study can have; only read."""
-    folder = tmp_path_factory.mktemp("whole")
-    trained = new_study(folder / "trained")
-    train_simulated(trained)
-    study = StudyPaths(shutil.copytree(small_demo / "study", folder / "study"))
-    shutil.copytree(trained / "training", study.training)
-    study.secret_file.parent.mkdir(mode=0o700, exist_ok=True)
+    study = StudyPaths(new_study(tmp_path_factory.mktemp("whole") / "study"))
+    with_secret(study)
+    study.secret_file.parent.mkdir(mode=0o700)
     shutil.copy(study.published_secret_file, study.secret_file)
+    shown = '[report]\nsections = ["agreement", "grades"]'
+    edit(study.protocol, "[report]", shown)
+    run("schedule", str(study.root))
+    train_simulated(study.root)
     protocol, who = read_protocol(study.protocol), {"who": "A", "why": "b"}
     grades = SimulatedGrades(protocol)
+    for rater in ("R1", "R2"):
+        run_session(study, protocol, rater, "test", grades=grades, clock="simulated")
     run_session(
         study, protocol, "R1", "test", grades=grades, clock="simulated", rehearsal=True
     )

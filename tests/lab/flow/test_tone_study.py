@@ -9,7 +9,7 @@ from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import PHASES, read_recording
 from masrel.lab.run import SimulatedGrades, run_session
 from masrel.lab.schedule import read_schedule
-from tests.files import table_of
+from tests.files import edit, table_of
 from tests.lab.flow.conftest import run
 
 RATERS = ("R1", "R2", "R3")
@@ -20,6 +20,7 @@ def rated(tmp_path_factory: pytest.TempPathFactory) -> StudyPaths:
     """The tone study, rated by its simulated raters through the command line."""
     study = StudyPaths(tmp_path_factory.mktemp("tone") / "study")
     run("init", str(study.root), "--study", "tone")
+    edit(study.protocol, 'stretches = "free"', "stretches = 1")
     run("schedule", str(study.root))
     for rater in RATERS:
         options = ("--session", "test", "--grades", "simulated", "--quiet")
@@ -39,7 +40,7 @@ def test_every_model_of_every_kind_was_presented_without_a_fault(
             recordings[shown.model] = recording = read_recording(file)
             facts = recording.facts
             ended = facts["fault"], facts["ended"], facts["simulated"]
-            assert ended == (None, "done", True)
+            assert ended == (None, "arrived", True)
     assert len(recordings) == 10
     # a model without a trigger, and a latch that closes, and gives way
     phases = [recordings[model].facts["phases"] for model in ("L3", "K3")]

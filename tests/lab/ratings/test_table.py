@@ -70,7 +70,6 @@ ROWS = st.lists(
 
 
 @settings(
-    max_examples=60,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
     deadline=None,
 )

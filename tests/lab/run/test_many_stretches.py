@@ -293,7 +293,7 @@ def rehearsed(small: Small) -> tuple[Path, list[object]]:
 
 
 def test_nothing_of_a_rehearsal_is_a_rating(new_study: New, tmp_path: Path) -> None:
-    study, protocol = small = with_rules(new_study, 'stretches = "free"')
+    study, protocol = small = new_study()
     same = (StudyPaths(tmp_path / "same"), protocol)
     shutil.copytree(study.root, same[0].root)
     other = (StudyPaths(tmp_path / "other"), protocol)

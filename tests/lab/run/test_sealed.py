@@ -20,13 +20,13 @@ from masrel.lab.conduct import (
     record_unblinding,
 )
 from masrel.lab.merging import merge_studies
-from masrel.lab.protocol import Protocol, StudyPaths, copy_template, read_protocol
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs, read_study_data
 from masrel.lab.run import run_session
 from masrel.lab.schedule import copy_for_site, read_schedule
 from masrel.lab.sealing import is_sealed, unseal_study
 from masrel.lab.verification import verify_study
-from tests.files import edit
+from tests.files import edit, small_study
 from tests.lab.flow.conftest import run as masrel
 from tests.lab.script import ScriptGrades
 
@@ -36,7 +36,7 @@ SAYS_MODELS = ("protocol.toml", "presented_", "README.md")  # not who met them
 
 
 def new_study(root: Path, *, sealed: bool) -> Sealed:
-    copy_template("small", root)
+    small_study(root)
     study = StudyPaths(root)
     if sealed:
         with study.protocol.open("a", encoding="utf-8") as file:
@@ -274,7 +274,7 @@ def test_what_was_drawn_sealed_stays_so_whatever_the_protocol_says(
 
 def test_sites_are_opened_alone_or_once_they_are_merged(tmp_path: Path) -> None:
     root = tmp_path / "whole"
-    copy_template("small", root)
+    small_study(root)
     edit(root / "protocol.toml", "[schedule]", '[schedule]\nstrata = "site"')
     edit(root / "protocol.toml", 'id = "R1"', 'id = "R1"\nsite = "north"')
     edit(root / "protocol.toml", 'id = "R2"', 'id = "R2"\nsite = "south"')

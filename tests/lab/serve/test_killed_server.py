@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from masrel.lab.conduct import allot_schedules
-from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import read_recording
 from masrel.lab.run import SimulatedGrades, read_log, run_session
 from tests.benchmarks.bench_serve import Lateness, Stops, by_the_browser, long_study
@@ -274,7 +274,7 @@ def test_it_is_neither_merged_nor_exported_nor_reported(
     masrel, private, merged = Caller(monkeypatch, capsys), list[bytes](), "merged"
     for site, raters in (("north", ("R1", "R2")), ("south", ("R3", "R4"))):
         study = StudyPaths(tmp_path / site)
-        copy_template("small", study.root)
+        small_study(study.root)
         text = study.protocol.read_text()
         for old, new in zip(("R1", "R2"), raters, strict=True):
             text = text.replace(f'"{old}"', f'"{new}"')
