@@ -652,8 +652,10 @@ def _presented(
         )
     options = session.options.emulated(_START) if hand else session.options
     limits = device_limits(table_v.device)
-    if still_s is not None:  # what is late is to be counted
-        limits = dataclasses.replace(limits, missed_ticks=1_000_000)
+    if still_s is not None:  # what is late is to be counted, up to the watchdog's time
+        limits = dataclasses.replace(
+            limits, missed_ticks=1_000_000, stale_time=limits.watchdog_time
+        )
     used = dataclasses.replace(session, clock=clock, hand=hand, options=options)
     with used.moving() as (device, watching):
         if calibration is not None:
