@@ -15,7 +15,7 @@ import pytest
 from scipy.special import expit, logit, stdtrit
 
 from masrel.agreement import SpanMatch, span_f1, unitizing_alpha
-from masrel.errors import UndefinedStatisticWarning
+from masrel.errors import RatingsError, UndefinedStatisticWarning
 
 Row = tuple[Any, ...]  # document, observer, category, begin, length
 Section = tuple[int, int, bool]  # begin, length, whether it is a unit
@@ -226,6 +226,31 @@ def test_nothing_to_compare_is_undefined() -> None:
     assert result.estimates[None].reason
     with pytest.warns(UndefinedStatisticWarning, match="0/0"):
         assert math.isnan(span_f1(looked)["Kim", "Lee"].value)
+
+
+@pytest.mark.parametrize(
+    ("spans", "places"),
+    [
+        # a document of nine units, in which one ends where the other begins, or later
+        ([("a", 0, 3), ("a", 3, 6)], None),
+        ([("a", 0, 4), ("b", 3, 6)], None),
+        ([("a", 3, 6), ("a", 0, 4)], ("0 to 4", "3 to 9")),
+        ([("a", 0, 9), ("a", 2, 1)], ("0 to 9", "2 to 3")),
+        ([("a", 3, 7)], ("3 to 10",)),
+        ([("a", -1, 2)], ("-1 to 1",)),
+        ([("a", 4, 0)], ("4 to 4",)),
+    ],
+)
+def test_which_spans_are_refused(
+    spans: list[tuple[str, int, int]], places: tuple[str, ...] | None
+) -> None:
+    rows: list[Row] = [("d", "Kim", "a", 0, 9)]
+    rows += [("d", "Lee", *of) for of in spans]
+    if places is None:
+        assert math.isfinite(unitizing_alpha(rows, length={"d": 9}).value)
+        return
+    with pytest.raises(RatingsError, match=".*".join(places)):
+        unitizing_alpha(rows, length={"d": 9})
 
 
 @pytest.mark.slow
