@@ -25,12 +25,13 @@ def _tree(module: str) -> ast.Module:
 
 def _nodes(tree: ast.AST, types: bool) -> Iterator[ast.AST]:
     """Every node, without what is imported for type checkers alone unless asked for."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            yield from _nodes(node, types) if types else ()
-        else:
-            yield node
-            yield from _nodes(node, types)
+    left = [tree]
+    while left:
+        node = left.pop()
+        yield node
+        is_typing = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+        if types or not is_typing:
+            left += ast.iter_child_nodes(node)
 
 
 @cache

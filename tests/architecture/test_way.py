@@ -9,6 +9,7 @@ from types import CodeType, FrameType
 
 import masrel
 from tests.cli.process import Caller
+from tests.files import edit
 
 ROOT = Path(masrel.__file__).parent
 PAGE = (ROOT.parent / "docs/development/ways.md").read_text("utf-8")
@@ -64,6 +65,7 @@ def test_a_presentation_goes_the_way_that_is_told(
     study = tmp_path / "study"
     session = ("--rater", "R1", "--session", "test", "--grades", "simulated")
     assert masrel("init", study).code == 0
+    edit(study / "protocol.toml", 'stretches = "free"', "stretches = 1")
     with passing() as passed:
         for call in (("schedule",), ("run", *session), ("report", "--quiet")):
             command, *options = call

@@ -72,7 +72,7 @@ def test_rules_that_differ_are_two_readings() -> None:
 
 
 def test_an_interval_beside_its_kappa_is_of_no_table_however_many_there_are() -> None:
-    claim = Claim(n_items=16, n_categories=3, kappa="0.50", low="0.6", high="0.7")
+    claim = Claim(n_items=13, n_categories=3, kappa="0.50", low="0.6", high="0.7")
     audit = audit_claim(claim)
     assert audit.is_possible is False
     assert {reading.n_tables for reading in audit.readings} == {0}

@@ -22,12 +22,12 @@ def is_quick(case: Case) -> bool:
 
 
 def _mark(case: Case) -> pytest.MarkDecorator:
-    """Of tables that the group "numbers" has more of, .ci/run compares a quarter.
+    """Of tables that the group "numbers" has more of, .ci/run compares an eighth.
 
     It leaves out other chains of a latent trait, too.
     """
     is_of_tables = case.group in ("agreement", "intervals")
-    is_left = is_of_tables and zlib.crc32(case.name.encode()) % 4 != 0
+    is_left = is_of_tables and zlib.crc32(case.name.encode()) % 8 != 0
     is_long = is_left or case.name == "random"
     return pytest.mark.long if is_long else pytest.mark.slow
 

@@ -10,10 +10,10 @@ MOST_SAID = 15
 
 
 def _parts() -> list[object]:
-    """Tables in parts: a tenth in each run, few of it quick; all in the long tests."""
+    """Tables in parts: a twentieth in each run, few quick; all in the long tests."""
     parts: list[tuple[range, tuple[pytest.MarkDecorator, ...]]] = [
         (numbers.TENTH[::20], ()),
-        *((numbers.TENTH[k::8], (pytest.mark.slow,)) for k in range(8)),
+        *((numbers.TENTH[k::8], (pytest.mark.slow,)) for k in range(4)),
         *((range(k, numbers.N_TABLES, 20), (pytest.mark.long,)) for k in range(20)),
     ]
     return [

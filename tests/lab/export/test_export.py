@@ -37,6 +37,9 @@ models = "all"
 sessions = ["test"]
 target = "items"
 interval = "jackknife"
+
+[report]
+sections = ["agreement", "grades"]
 """
 ALL = ("notes", "logs", "illness", "after.secret")
 SECRETS = (b"very private", b"private, too", b"Somebody Private", b"a private reason")

@@ -75,7 +75,7 @@ def wait_for_presentation(study: StudyPaths) -> None:
 
 
 ONE = FREE.partition("[presentation]")[0]
-CUED = FREE.replace('"free"', '["slow", "fast"]\nslow_speed_deg_s = 40.0')
+CUED = FREE.replace('"free"', '["slow", "fast"]\nslow_speed_deg_s = 60.0')
 FAST = "Stretch 2: fast, at least 120 deg/s (V3)"
 ASKED = "Stretch the arm as often as you want, then press Enter"
 
@@ -100,7 +100,7 @@ def test_enter_says_done_and_every_other_key_is_an_emergency_stop(
     answer: str,
     end: tuple[str, str] | str,
 ) -> None:
-    speed = 30.0 if device == FREE else 60.0  # deg/s
+    speed = 30.0 if device == FREE else 90.0  # deg/s
     study, _ = small_study(tmp_path / "study", speed, device=device)
     with closing(Terminal(study)) as terminal:
         assert asked in terminal.read_until("or type stop")

@@ -130,7 +130,13 @@ def until_fast(study: Small, code: str) -> float:
     return float(np.sum((speed > 0.1 * speed[-1]) & (speed < 0.9 * speed[-1]))) * 1e-3
 
 
-SLOW = "[simulated_raters]\nmean_speed_deg_s = 12.0\nspeed_sd_deg_s = 0.0\n"
+SLOW = """[stretch]
+start_deg = 90.0
+
+[simulated_raters]
+mean_speed_deg_s = 12.0
+speed_sd_deg_s = 0.0
+"""
 
 
 def test_what_was_too_slow_is_said_to_the_rater_counted_and_graded_all_the_same(
