@@ -1,7 +1,7 @@
 """``masrel joint fit``: a joint of recordings; ``friction``: a device's friction."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -253,8 +253,6 @@ def fit(
 
 def _options(of_joint: "dict[str, Any]", level: float) -> "dict[str, Any]":
     # as `identification.fit` takes them
-    from dataclasses import replace
-
     from masrel.lab.elbow import STANDARD_MODELS
 
     post_catch = of_joint.pop("post_catch")

@@ -5,7 +5,7 @@ What a job is told of them: estimates and gates as JUnit and as Markdown.
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,8 +21,6 @@ from masrel.lab._study_files import no_follow, sha256_of
 from masrel.lab.report._report_folder import file_hash
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from masrel.lab.analysis import Analysis, PlannedEstimate
     from masrel.lab.protocol import Protocol
 

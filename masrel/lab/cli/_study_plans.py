@@ -2,15 +2,21 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from masrel.agreement import coefficient
 from masrel.errors import ParameterError
-
-if TYPE_CHECKING:
-    from masrel.lab.protocol import EstimatePlan, Protocol, SampleSize
-    from masrel.planning import Plan
+from masrel.lab.protocol import (
+    EstimatePlan,
+    Protocol,
+    SampleSize,
+    StudyPaths,
+    read_protocol,
+    scale_of,
+)
+from masrel.planning import Plan, Study, precision
 
 _USUAL_VALUES = (0.4, 0.6, 0.8)
 _AIM = ("half_width", "lower", "upper", "null")
@@ -18,11 +24,8 @@ _AIM = ("half_width", "lower", "upper", "null")
 
 def study_plans(
     folder: Path, options: dict[str, Any], progress: Callable[[int, int], None]
-) -> "tuple[tuple[str, ...], tuple[Plan, ...]]":
+) -> tuple[tuple[str, ...], tuple[Plan, ...]]:
     """Return the ids of lines, and their plans; what has none is noted."""
-    from masrel.lab.protocol import StudyPaths, read_protocol
-    from masrel.planning import Study, precision
-
     cells = list(_cells(read_protocol(StudyPaths(folder).protocol), options))
     labelled: list[tuple[str, Plan]] = []
     for place, (line, arguments) in enumerate(cells, 1):
@@ -40,8 +43,8 @@ def study_plans(
 
 
 def _cells(
-    protocol: "Protocol", options: dict[str, Any]
-) -> "Iterator[tuple[EstimatePlan, dict[str, Any]]]":
+    protocol: Protocol, options: dict[str, Any]
+) -> Iterator[tuple[EstimatePlan, dict[str, Any]]]:
     # every line that has an interval, for every value that is taken to be true
     sizes = {size.estimate: size for size in protocol.analysis.sample_sizes}
     for line in protocol.analysis.estimates:
@@ -65,14 +68,12 @@ def _cells(
 
 
 def _arguments(
-    protocol: "Protocol",
-    line: "EstimatePlan",
-    size: "SampleSize | None",
+    protocol: Protocol,
+    line: EstimatePlan,
+    size: SampleSize | None,
     options: dict[str, Any],
 ) -> dict[str, Any]:
     # what the options say, else how the size was chosen, else what is usual
-    from masrel.lab.protocol import scale_of
-
     is_normal = line.coefficient.startswith("icc")
     level = protocol.analysis.level
     declared: dict[str, Any] = {"level": level, "model": "dirichlet-multinomial"}
@@ -97,10 +98,8 @@ def _arguments(
     }
 
 
-def _study_size(protocol: "Protocol", line: "EstimatePlan") -> tuple[int, int]:
+def _study_size(protocol: Protocol, line: EstimatePlan) -> tuple[int, int]:
     # items are models as often as they are presented; a rater alone has two sessions
-    from masrel.agreement import coefficient
-
     n_models = sum(line.models in ("all", model.role) for model in protocol.models)
     sessions = {session.id: set(session.raters) for session in protocol.sessions}
     n_raters = len(set.intersection(*(sessions[name] for name in line.sessions)))

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+import numpy as np
 from tqdm import tqdm
 
 from masrel._files import safe_cell
@@ -22,8 +23,20 @@ from masrel.cli._options import (
 )
 from masrel.cli._paths import FileInFolder, InputFile
 from masrel.errors import ParameterError
+from masrel.lab import elbow
 from masrel.lab._study_files import new_file
 from masrel.lab.cli.joint import START_DEG, JointOptions, joint_options, joints_of
+from masrel.lab.elbow import (
+    ElbowParameters,
+    Joined,
+    JointModel,
+    Motion,
+    Recorded,
+    Reversed,
+    interrupted,
+)
+from masrel.lab.elbow.motions import Interpolation
+from masrel.lab.recording import PHASES
 from masrel.lab.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_STAMP,
@@ -35,10 +48,6 @@ from masrel.lab.report._traced_scenes import (
     scenes_content,
     scenes_text,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.elbow import JointModel, Motion
-    from masrel.lab.elbow.motions import Interpolation
 
 # Class of each motion of a speed, and what it calls that
 _STRETCHES = {
@@ -65,7 +74,7 @@ class _MotionOptions:
     end: float | None
     acceleration: float | None  # of a trapezoid, deg/s²
     recording: Path | None  # the file of a recording
-    interpolation: "Interpolation | None"  # of a recording
+    interpolation: Interpolation | None  # of a recording
     # stop, pause: when it is stopped and for how long, s
     stop: float | None
     pause: float | None
@@ -264,7 +273,7 @@ def _documents(
 
 
 def _scenes(
-    joints: "dict[str, JointModel]",
+    joints: dict[str, JointModel],
     stretch: _MotionOptions,
     speeds: Sequence[float],
 ) -> list[Scene]:
@@ -296,10 +305,8 @@ def _scenes(
     return scenes
 
 
-def _end_of(stretch: _MotionOptions, joint: "JointModel") -> float:
+def _end_of(stretch: _MotionOptions, joint: JointModel) -> float:
     # deg; a stretch of a spastic elbow is cut at the end of range, no other goes beyond
-    from masrel.lab.elbow import ElbowParameters
-
     if isinstance(joint, ElbowParameters) or stretch.recording is not None:
         return _END_DEG if stretch.end is None else stretch.end
     limit = math.degrees(joint.range_end)
@@ -314,9 +321,7 @@ def _end_of(stretch: _MotionOptions, joint: "JointModel") -> float:
 
 def _motion_of(
     stretch: _MotionOptions, speed_deg_s: float | None, start_deg: float, end_deg: float
-) -> "Motion":
-    from masrel.lab import elbow
-
+) -> Motion:
     if stretch.recording is not None:
         once = _recorded(stretch.recording, stretch.interpolation, speed_deg_s)
     elif speed_deg_s is None:
@@ -334,9 +339,8 @@ def _motion_of(
 
 
 def _recorded(
-    file: Path, interpolation: "Interpolation | None", speed_deg_s: float | None
-) -> "Motion":
-    from masrel.lab.elbow import Recorded
+    file: Path, interpolation: Interpolation | None, speed_deg_s: float | None
+) -> Motion:
     from masrel.lab.elbow.identification._reading import read_angles
 
     if speed_deg_s is not None:
@@ -350,9 +354,7 @@ def _recorded(
         raise ParameterError(f"{file}: {error}") from error
 
 
-def _stopped_and_repeated(stretch: _MotionOptions, once: "Motion") -> "Motion":
-    from masrel.lab.elbow import Joined, Reversed, interrupted
-
+def _stopped_and_repeated(stretch: _MotionOptions, once: Motion) -> Motion:
     motion = once
     if stretch.stop is not None and stretch.pause is not None:
         if not 0.0 < stretch.stop < once.duration:
@@ -400,11 +402,6 @@ def _write_samples(
 def _sample_rows(
     scenes: Sequence[Scene], rate_hz: float, *, several: bool
 ) -> Iterator[tuple[Any, ...]]:
-    import numpy as np
-
-    from masrel.lab import elbow
-    from masrel.lab.recording import PHASES
-
     for scene in scenes:
         made = elbow.trace(scene.joint, scene.motion, rate_hz=rate_hz)
         degrees = map(np.degrees, (made.angle, made.velocity))

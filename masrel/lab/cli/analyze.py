@@ -2,7 +2,6 @@
 
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -13,12 +12,19 @@ from masrel.cli._options import (
     output_options,
     write_json,
 )
+from masrel.lab import analysis as library
+from masrel.lab.analysis import Analysis
 from masrel.lab.cli._gating import GateOptions, conclude, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
-
-if TYPE_CHECKING:
-    from masrel.lab.analysis import Analysis
-    from masrel.lab.ratings import StudyData
+from masrel.lab.ratings import StudyData
+from masrel.lab.report import StudyConduct, study_conduct
+from masrel.lab.report._agreement import estimate_tables, judge_tables
+from masrel.lab.report._document import made_section
+from masrel.lab.report._grade_sections import felt_sentences
+from masrel.lab.report._material import gather, lacking
+from masrel.lab.report._trace_section import speed_tables
+from masrel.pages._sections import Content, Paragraph
+from masrel.tables._tables import Table, as_csv, as_text
 
 
 @click.command("analyze", cls=GroupedHelp)
@@ -41,9 +47,6 @@ def analyze(
 
     Prints the tables and writes STUDY/analysis.json, or the file named by --json.
     """
-    from masrel.lab import analysis as library
-    from masrel.lab.report import study_conduct
-
     data = read_study(study, ratings_file)
     gates = gating.gates(data.protocol)
     with warnings_as_notes():
@@ -67,22 +70,19 @@ def analyze(
         within=None if output.json_file else study,
         is_private=conduct is not None and conduct.goes_on,
     )
-    _show(data, analysis, csv=bool(output.csv), raw=output.raw_csv)
+    _show(data, analysis, conduct, csv=bool(output.csv), raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
     conclude(verdict_of(analysis, gates), gating)
 
 
-def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
-    from masrel.lab.report import study_conduct
-    from masrel.lab.report._agreement import estimate_tables, judge_tables
-    from masrel.lab.report._document import made_section
-    from masrel.lab.report._grade_sections import felt_sentences
-    from masrel.lab.report._material import gather, lacking
-    from masrel.lab.report._trace_section import speed_tables
-    from masrel.pages._sections import Content, Paragraph
-    from masrel.tables._tables import Table, as_csv, as_text
-
-    conduct = study_conduct(data.paths, data.protocol)
+def _show(
+    data: StudyData,
+    analysis: Analysis,
+    conduct: StudyConduct | None,
+    *,
+    csv: bool,
+    raw: bool,
+) -> None:
     of_study = (data.protocol, data.ratings, analysis, data.in_person)
     material = gather(*of_study, conduct=conduct)
     felt = felt_sentences(material)

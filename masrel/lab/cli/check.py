@@ -9,11 +9,16 @@ import click
 
 from masrel.errors import DeviceError, MasrelError, ParameterError, ProtocolError
 from masrel.lab._study_files import read_once
+from masrel.lab.analysis._plan import unanswered
 from masrel.lab.cli._study_options import echo_remarks, study_argument
+from masrel.lab.paper._form import off_scale
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.lab.protocol.content import _coefficient_problems
-from masrel.lab.ratings import study_remarks
+from masrel.lab.ratings import read_study_ratings, study_remarks
+from masrel.lab.ratings.study_data import _table_problem
+from masrel.lab.run._settings import check_backend, device_notes, torque_problems
 from masrel.lab.schedule import concealment_notes, schedule_problems
+from masrel.lab.verification import verify_sessions
 from masrel.tables._tables import counted
 
 
@@ -29,8 +34,6 @@ def check(study: Path) -> None:
     except ProtocolError as error:
         problems = list(error.problems)
     else:
-        from masrel.lab.run._settings import device_notes  # loads numpy
-
         problems = [each for checker in _CHECKERS for each in checker(protocol, paths)]
         # What only may happen is for a study of which all else is right.
         of_device = () if problems else device_notes(protocol, paths)
@@ -56,8 +59,6 @@ def check(study: Path) -> None:
 
 
 def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.analysis._plan import unanswered  # loads pandas
-
     unknown = dict(_coefficient_problems(protocol))
     for index, line in enumerate(protocol.analysis.estimates):
         if index in unknown:
@@ -70,8 +71,6 @@ def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.run._settings import check_backend, torque_problems  # loads numpy
-
     try:
         check_backend(protocol)
     except (ParameterError, DeviceError) as error:
@@ -82,15 +81,11 @@ def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     if not study.sessions.is_dir() and not study.conduct_logs():
         return
-    from masrel.lab.verification import verify_sessions
-
     findings = verify_sessions(study, protocol).findings
     yield from (each.message for each in findings if each.weight == "broken")
 
 
 def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.paper._form import off_scale
-
     for place in protocol.rater_sessions:
         for file in (study.sheet_file(*place), study.typed_file(*place)):
             if file.is_file():
@@ -98,9 +93,6 @@ def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.ratings import read_study_ratings
-    from masrel.lab.ratings.study_data import _table_problem
-
     for path in (study.ratings_file, study.published_file):
         try:
             if path.exists():

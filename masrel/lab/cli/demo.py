@@ -10,8 +10,19 @@ from tqdm import tqdm
 from masrel._files import write_file, write_files
 from masrel.cli._options import OutputOptions, output_options
 from masrel.errors import MasrelWarning, ParameterError
+from masrel.lab.analysis import analyze, write_analysis
 from masrel.lab.cli._study_options import read_study
-from masrel.lab.protocol import Protocol, StudyPaths, copy_template, read_protocol
+from masrel.lab.conduct import Note, allot_schedules, record_note
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.ratings import (
+    answers_from_logs,
+    ratings_from_logs,
+    write_answers,
+    write_ratings,
+)
+from masrel.lab.report import study_conduct, write_report
+from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.schedule._secret import N_BYTES, SECRET_TEXT
 
 # Of what is in the log of the study: the same each time, as reports have it
 _DAY = datetime(2012, 1, 1, tzinfo=UTC)
@@ -52,7 +63,10 @@ def demo(out: Path, template: str | None, device: str, output: OutputOptions) ->
             copy_template(name, study.root)
             if device != "simulated":
                 _emulate(study, device)
-            _publish_secret(study)
+            # A demo hides nothing, and is the same each time.
+            if not study.published_secret_file.exists():
+                secret = SECRET_TEXT.format(bytes(range(N_BYTES)).hex())
+                write_file(study.published_secret_file, secret)
             _simulate(study, output)
             report = "simulated" if folder == "study" else folder
             pages.append(_report(study, study.ratings_file, report, output))
@@ -75,26 +89,8 @@ def _emulate(study: StudyPaths, device: str) -> None:
     write_files({study.protocol: tomlkit.dumps(document)})
 
 
-def _publish_secret(study: StudyPaths) -> None:
-    # A demo hides nothing, and is the same each time.
-    from masrel.lab.schedule._secret import N_BYTES, SECRET_TEXT
-
-    if not study.published_secret_file.exists():
-        text = SECRET_TEXT.format(bytes(range(N_BYTES)).hex())
-        write_file(study.published_secret_file, text)
-
-
 def _simulate(study: StudyPaths, output: OutputOptions) -> None:
     # every rater of every session, on the simulated device and clock
-    from masrel.lab.conduct import allot_schedules
-    from masrel.lab.ratings import (
-        answers_from_logs,
-        ratings_from_logs,
-        write_answers,
-        write_ratings,
-    )
-    from masrel.lab.run import SimulatedGrades, run_session
-
     protocol = read_protocol(study.protocol)
     allot_schedules(study, protocol, now=lambda: _DAY)
     occasions = protocol.rater_sessions
@@ -115,40 +111,26 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
                 clock="simulated",
                 progress=lambda _: bar.update(),
             )
-    _record_event(study, protocol)
+    note = Note(  # as a coordinator does
+        text="simulated: sore wrist after the session",
+        who="demo",
+        kind="adverse-event",
+        severity="mild",
+        action="rest",
+        outcome="gone the next day",
+        rater=protocol.raters[0].id,
+        session=protocol.sessions[0].id,
+    )
+    record_note(study, protocol, note, now=lambda: _DAY)
     write_ratings(ratings_from_logs(study, protocol), study.ratings_file)
     if protocol.questionnaires:
         write_answers(answers_from_logs(study, protocol), study.answers_file)
-
-
-def _record_event(study: StudyPaths, protocol: Protocol) -> None:
-    # as a coordinator does
-    from masrel.lab.conduct import Note, record_note
-
-    record_note(
-        study,
-        protocol,
-        Note(
-            text="simulated: sore wrist after the session",
-            who="demo",
-            kind="adverse-event",
-            severity="mild",
-            action="rest",
-            outcome="gone the next day",
-            rater=protocol.raters[0].id,
-            session=protocol.sessions[0].id,
-        ),
-        now=lambda: _DAY,
-    )
 
 
 def _report(
     study: StudyPaths, ratings_file: Path, name: str, output: OutputOptions
 ) -> Path:
     # beside the study, in a folder of this name
-    from masrel.lab.analysis import analyze, write_analysis
-    from masrel.lab.report import study_conduct, write_report
-
     destination = study.root.parent / f"report-{name}"
     is_simulated = ratings_file == study.ratings_file
     data = read_study(study.root, None if is_simulated else ratings_file)

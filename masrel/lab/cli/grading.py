@@ -1,7 +1,7 @@
 """``masrel grading``: what grades follow, by ordered regression."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
@@ -12,11 +12,11 @@ from masrel.cli._options import (
     split_commas,
     write_output,
 )
+from masrel.lab.analysis import Effect, GradeRegression, grade_regression
+from masrel.lab.analysis._grading import PREDICTORS
+from masrel.lab.analysis._results import as_plain
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
-
-if TYPE_CHECKING:
-    from masrel.lab.analysis import Effect, GradeRegression
-    from masrel.tables._tables import Table
+from masrel.tables._tables import Column, Table, interval_text, number
 
 
 @click.command("grading")
@@ -56,9 +56,6 @@ def grading(
     Prints the factor by which one standard deviation of each predictor multiplies the
     odds of a higher grade, with the others held constant.
     """
-    from masrel.lab.analysis import grade_regression
-    from masrel.lab.analysis._results import as_plain
-
     data = read_study(study, ratings_file)
     with warnings_as_notes():
         regression = grade_regression(
@@ -77,9 +74,7 @@ def grading(
     )
 
 
-def _table(regression: "GradeRegression") -> "Table":
-    from masrel.tables._tables import Column, Table
-
+def _table(regression: GradeRegression) -> Table:
     return Table(
         name="grading",
         caption="Odds of a higher grade, per standard deviation",
@@ -100,19 +95,11 @@ def _table(regression: "GradeRegression") -> "Table":
     )
 
 
-def _row(effect: "Effect") -> tuple[str, str, float, str]:
-    from masrel.tables._tables import interval_text, number
-
+def _row(effect: Effect) -> tuple[str, str, float, str]:
+    unit = PREDICTORS[effect.predictor][1]
     return (
         effect.predictor,
-        f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
+        number(effect.per, 3) + ("" if unit == "1" else f" {unit}"),
         effect.odds_ratio,
         interval_text(effect.low, effect.high, 2),
     )
-
-
-def _unit(predictor: str) -> str:
-    from masrel.lab.analysis._grading import PREDICTORS
-
-    unit = PREDICTORS[predictor][1]
-    return "" if unit == "1" else unit

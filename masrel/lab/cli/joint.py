@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -25,11 +25,22 @@ from masrel.cli._options import (
 from masrel.cli._paths import InputFile, note_inputs, refuse_inputs
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular, sha256_of
-
-if TYPE_CHECKING:
-    from masrel.lab.elbow import ElbowParameters, JointModel
-    from masrel.tables._tables import Table
-
+from masrel.lab.elbow import (
+    STANDARD_MODELS,
+    ElbowParameters,
+    JointModel,
+    intermediate_models,
+)
+from masrel.lab.elbow._model_file import MODEL_KEYS, QUANTITIES, as_toml, model_document
+from masrel.lab.protocol import StudyPaths, joint_model, read_model_file, read_protocol
+from masrel.lab.protocol._kinds import (
+    DEFAULT_KIND,
+    kind_problem,
+    model_of_kind,
+    value_problems,
+)
+from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
+from masrel.tables._tables import Column, Table
 
 _COMMANDS = {
     "trace": "Compute phases, peak torque and samples of stretches of models.",
@@ -70,10 +81,8 @@ class JointOptions:
     rise: float | None  # how long torque takes to its peak, s
     inertia: float | None  # m of (1) and (5), kg·m²
 
-    def changed(self, joint: "JointModel") -> "JointModel":
+    def changed(self, joint: JointModel) -> JointModel:
         """Return a joint with the changes, which only a spastic elbow can have."""
-        from masrel.lab.elbow import ElbowParameters
-
         options = {
             "rest_angle": None if self.rest is None else math.radians(self.rest),
             "post_catch": self.post_catch,
@@ -159,8 +168,6 @@ def tardieu(
     output: OutputOptions,
 ) -> None:
     """Compute R2, R1 and their difference from full-range stretches at three speeds."""
-    from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
-
     documents = [
         tardieu_document(name, joint, start, speeds)
         for name, joint in joints_of(joints).items()
@@ -174,10 +181,8 @@ def tardieu(
     )
 
 
-def joints_of(names: JointOptions) -> dict[str, "JointModel"]:
+def joints_of(names: JointOptions) -> dict[str, JointModel]:
     """Return joints by name."""
-    from masrel.lab.protocol import StudyPaths, joint_model, read_protocol
-
     if not names.models and not names.kinds:
         raise click.UsageError("Missing option '--model' or '--kind'.")
     if names.parameters and len(names.kinds) != 1:
@@ -211,11 +216,8 @@ def _names(option: str, models: Sequence[str]) -> list[str]:
     return names
 
 
-def _read_joint(option: str, model: str, more: str = "") -> "ElbowParameters":
+def _read_joint(option: str, model: str, more: str = "") -> ElbowParameters:
     # a standard model, or that of a file
-    from masrel.lab.elbow import STANDARD_MODELS
-    from masrel.lab.protocol import read_model_file
-
     if model.endswith(".toml"):
         note_inputs(Path(model))
         return read_model_file(Path(model))
@@ -227,15 +229,8 @@ def _read_joint(option: str, model: str, more: str = "") -> "ElbowParameters":
     return STANDARD_MODELS[model]
 
 
-def _joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
+def _joint_of_kind(kind: str, settings: Sequence[str]) -> JointModel:
     # settings: KEY=VALUE each
-    from masrel.lab.protocol._kinds import (
-        DEFAULT_KIND,
-        kind_problem,
-        model_of_kind,
-        value_problems,
-    )
-
     refuse(
         ((problem := kind_problem(kind)) is not None, f"--kind: {problem}"),
         (
@@ -328,9 +323,6 @@ def between(
 
 def _rows(models: Sequence[str], n_models: int) -> list[dict[str, Any]]:
     # for every new model its name, its neighbours, and the content of its file
-    from masrel.lab.elbow import intermediate_models
-    from masrel.lab.elbow._model_file import model_document
-
     names, rows = _names("MODEL", models), []
     joints = [_read_joint("MODEL", model) for model in models]
     sources = [_source(*of) for of in zip(names, models, strict=True)]
@@ -369,8 +361,6 @@ def _source(name: str, model: str) -> tuple[str, bool]:
 
 
 def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None:
-    from masrel.lab.elbow._model_file import as_toml
-
     files = [folder / f"{row['name']}.toml" for row in rows]
     refuse_inputs(*files)
     there = [path.name for path in files if path.exists()]
@@ -386,10 +376,7 @@ def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None
     click.echo(f"models: {folder}, {files[0].name} to {files[-1].name}", err=True)
 
 
-def _table(rows: list[dict[str, Any]]) -> "Table":
-    from masrel.lab.elbow._model_file import MODEL_KEYS, QUANTITIES
-    from masrel.tables._tables import Column, Table
-
+def _table(rows: list[dict[str, Any]]) -> Table:
     quantities = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]
     return Table(
         name="between",

@@ -1,7 +1,6 @@
 """``masrel paper``: sheets to print, and those that were filled in, into logs."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -14,10 +13,9 @@ from masrel.lab.cli._study_options import (
     several,
     warnings_as_notes,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.paper import SheetDifference
-    from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.paper import SheetDifference, compare_sheet, enter_sheet, write_sheets
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.run._state import NO_DEVICE
 
 
 @click.group("paper", cls=Commands)
@@ -33,8 +31,8 @@ def paper() -> None:
 )
 @click.option("--site", "sites", multiple=True, help="Id of a site; default: all.")
 def _print(
-    paths: "StudyPaths",
-    protocol: "Protocol",
+    paths: StudyPaths,
+    protocol: Protocol,
     raters: tuple[str, ...],
     sessions: tuple[str, ...],
     sites: tuple[str, ...],
@@ -45,8 +43,6 @@ def _print(
     models. Type each completed sheet into its file, then run masrel paper enter. A file
     that already has entries is not changed.
     """
-    from masrel.lab.paper import write_sheets
-
     made = write_sheets(paths, protocol, raters=raters, sessions=sessions, sites=sites)
     n_typed, n_kept = len(made.typed), len(made.unchanged)
     note = f", {n_kept} of them filled in and kept" if n_kept else ""
@@ -75,8 +71,8 @@ _sheet_options = several(
 )
 @click.option("--device", help="Device that presented the models; default: none.")
 def _enter(
-    paths: "StudyPaths",
-    protocol: "Protocol",
+    paths: StudyPaths,
+    protocol: Protocol,
     file: Path,
     rater: str,
     session: str,
@@ -88,9 +84,6 @@ def _enter(
 
     The whole sheet is added to the session's log; if any row is wrong, nothing is.
     """
-    from masrel.lab.paper import enter_sheet
-    from masrel.lab.run._state import NO_DEVICE
-
     with warnings_as_notes():
         entered = enter_sheet(
             paths,
@@ -114,8 +107,8 @@ def _enter(
 @paper.command("again")
 @_sheet_options
 def _again(
-    paths: "StudyPaths",
-    protocol: "Protocol",
+    paths: StudyPaths,
+    protocol: Protocol,
     file: Path,
     rater: str,
     session: str,
@@ -126,8 +119,6 @@ def _again(
     Nothing is entered. If the two entries differ, the differences are listed and the
     exit code is 1.
     """
-    from masrel.lab.paper import compare_sheet
-
     differences = compare_sheet(paths, protocol, file, rater, session, who=who)
     for each in differences:
         click.echo(_in_words(each))
@@ -142,7 +133,7 @@ def _again(
     click.echo(f"session {session} of {rater}: both entries agree")
 
 
-def _in_words(each: "SheetDifference") -> str:
+def _in_words(each: SheetDifference) -> str:
     where = "" if each.code is None else f"code {each.code}: "
     return (
         f"{each.file}: row {each.row}: {where}{each.column}: first {each.first}, "

@@ -1,12 +1,12 @@
 """``masrel record``: what somebody states of a study, with who says so."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from masrel.cli._commands import STUDY, Commands
-from masrel.cli._options import Decorator
+from masrel.cli._options import Decorator, write_json
 from masrel.errors import ParameterError
 from masrel.lab.cli._study_options import (
     echo_stamp,
@@ -17,10 +17,21 @@ from masrel.lab.cli._study_options import (
     stamp_option,
     warnings_as_notes,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.conduct._statements import NoteKind, Standing
-    from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.conduct import (
+    Note,
+    record_amendment,
+    record_new_rater,
+    record_note,
+    record_rater_values,
+    record_standing,
+    record_unblinding,
+    registration,
+)
+from masrel.lab.conduct._statements import NoteKind, Standing
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol.study import _OPENED
+from masrel.lab.run import record_answer, record_correction, record_day, record_skip
+from masrel.lab.sealing import unseal_study
 
 
 @click.group("record", cls=Commands)
@@ -51,10 +62,8 @@ def _of_session(*options: Decorator) -> Decorator:
     return several(of_study, id_option, session_option, *options, _who, _why)
 
 
-def _add_note(kind: "NoteKind", text: str, *options: Decorator) -> None:
-    def command(study: "StudyPaths", protocol: "Protocol", **fields: Any) -> None:
-        from masrel.lab.conduct import Note, record_note
-
+def _add_note(kind: NoteKind, text: str, *options: Decorator) -> None:
+    def command(study: StudyPaths, protocol: Protocol, **fields: Any) -> None:
         record_note(study, protocol, Note(kind=kind, **fields))
         click.echo(f"{kind} recorded: {study.conduct_file}")
 
@@ -110,8 +119,8 @@ def _or_missing(text: str) -> str | None:
     ),
 )
 def _correct(
-    study: "StudyPaths",
-    protocol: "Protocol",
+    study: StudyPaths,
+    protocol: Protocol,
     rater: str,
     session: str,
     grade: str,
@@ -119,8 +128,6 @@ def _correct(
     **reasons: Any,
 ) -> None:
     """Correct the grade of a presentation; the original grade stays in the log."""
-    from masrel.lab.run import record_correction
-
     record_correction(
         study, protocol, rater, session, code=code, grade=_or_missing(grade), **reasons
     )
@@ -138,8 +145,8 @@ def _correct(
     )
 )
 def _day(
-    study: "StudyPaths",
-    protocol: "Protocol",
+    study: StudyPaths,
+    protocol: Protocol,
     rater: str,
     session: str,
     **fields: Any,
@@ -148,8 +155,6 @@ def _day(
 
     The days between sessions are recalculated.
     """
-    from masrel.lab.run import record_day
-
     with warnings_as_notes():
         record_day(study, protocol, rater, session, **fields)
     click.echo(
@@ -161,16 +166,14 @@ def _day(
 @record.command("skip")
 @_of_session(_code)
 def _skip(
-    study: "StudyPaths",
-    protocol: "Protocol",
+    study: StudyPaths,
+    protocol: Protocol,
     rater: str,
     session: str,
     code: str,
     **reasons: Any,
 ) -> None:
     """Leave a presentation without a grade after a fault."""
-    from masrel.lab.run import record_skip
-
     record_skip(study, protocol, rater, session, code=code, **reasons)
     log = study.log_file(rater, session)
     click.echo(
@@ -192,16 +195,14 @@ def _skip(
     ),
 )
 def _answer(
-    study: "StudyPaths",
-    protocol: "Protocol",
+    study: StudyPaths,
+    protocol: Protocol,
     rater: str,
     session: str,
     answer: str,
     **fields: Any,
 ) -> None:
     """Correct an answer to a question; the original answer stays in the log."""
-    from masrel.lab.run import record_answer
-
     log = record_answer(
         study, protocol, rater, session, answer=_or_missing(answer), **fields
     )
@@ -231,8 +232,8 @@ def _rater() -> None:
 @click.argument("values", metavar="FIELD=VALUE...", nargs=-1, required=True)
 @_who
 def _set(
-    study: "StudyPaths",
-    protocol: "Protocol",
+    study: StudyPaths,
+    protocol: Protocol,
     rater: str,
     values: tuple[str, ...],
     who: str,
@@ -242,8 +243,6 @@ def _set(
     The protocol declares the fields in [rater_fields]. The latest value counts; earlier
     values stay in the log. FIELD= alone records that the value is unknown.
     """
-    from masrel.lab.conduct import record_rater_values
-
     by_field = _by_field(values)
     record_rater_values(study, protocol, rater, by_field, who=who)
     click.echo(f"{', '.join(by_field)} of {rater} recorded: {study.conduct_file}")
@@ -263,8 +262,8 @@ def _set(
 @click.argument("values", metavar="[FIELD=VALUE]...", nargs=-1)
 @_who
 def _add(
-    study: "StudyPaths",
-    protocol: "Protocol",
+    study: StudyPaths,
+    protocol: Protocol,
     rater: str,
     sessions: tuple[str, ...],
     values: tuple[str, ...],
@@ -274,8 +273,6 @@ def _add(
 
     Schedules that have been drawn are not changed.
     """
-    from masrel.lab.conduct import record_new_rater
-
     by_field = _by_field(values)
     record_new_rater(study, protocol, rater, sessions, values=by_field, **fields)
     click.echo(f"{rater} is in {study.protocol}. Next: masrel schedule {study.root}")
@@ -298,14 +295,12 @@ def _by_field(values: tuple[str, ...]) -> dict[str, str]:
 @of_study
 @_who
 @_why
-def _amend(study: "StudyPaths", protocol: "Protocol", who: str, why: str) -> None:
+def _amend(study: StudyPaths, protocol: Protocol, who: str, why: str) -> None:
     """Record that the plan of STUDY was changed after its first schedules were drawn.
 
     Edit the protocol first; a copy of it is added to the log. Every command that reads
     the study, and its report, will then state what changed and when.
     """
-    from masrel.lab.conduct import record_amendment
-
     for change in record_amendment(study, protocol, who=who, why=why):
         click.echo(change)
     click.echo(f"amendment recorded: {study.conduct_file}")
@@ -322,29 +317,24 @@ def _amend(study: "StudyPaths", protocol: "Protocol", who: str, why: str) -> Non
 )
 @stamp_option
 def _register(
-    study: "StudyPaths", protocol: "Protocol", output: Path, stamp: str | None
+    study: StudyPaths, protocol: Protocol, output: Path, stamp: str | None
 ) -> None:
     """Write a file for a registry: the plan of STUDY and a commitment to its orders.
 
     The file has the protocol with its hash, and the hash of the secret that the orders
     are drawn from, which reveals nothing about them.
     """
-    from masrel.cli._options import write_json
-    from masrel.lab.conduct import registration
-
     write_json(registration(study, protocol), output)
     click.echo(output)
     echo_stamp(output, stamp)
 
 
 def _add_standing(
-    name: str, standing: "Standing", words: str, text: str, *more: Decorator
+    name: str, standing: Standing, words: str, text: str, *more: Decorator
 ) -> None:
     def command(
-        study: "StudyPaths", protocol: "Protocol", rater: str, **reasons: Any
+        study: StudyPaths, protocol: Protocol, rater: str, **reasons: Any
     ) -> None:
-        from masrel.lab.conduct import record_standing
-
         record_standing(study, protocol, rater, standing, **reasons)
         click.echo(f"{rater} {words}: {study.conduct_file}")
 
@@ -385,8 +375,8 @@ _add_standing(
 @click.option("--who", required=True, help="Who is being unblinded.")
 @_why
 def _unblind(
-    study: "StudyPaths",
-    protocol: "Protocol",
+    study: StudyPaths,
+    protocol: Protocol,
     code: str | None,
     every: bool,
     **fields: Any,
@@ -396,10 +386,6 @@ def _unblind(
     This becomes an event in STUDY/conduct.jsonl, and the report states it. --all opens
     a sealed study once every session is over.
     """
-    from masrel.lab.conduct import record_unblinding
-    from masrel.lab.protocol.study import _OPENED
-    from masrel.lab.sealing import unseal_study
-
     if (code is None) != every:
         raise click.UsageError("needs either a CODE or --all")
     if every and not (fields["rater"] or fields["session"]):

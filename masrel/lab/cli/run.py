@@ -1,6 +1,6 @@
 """``masrel run``: present a schedule's models and record every grade."""
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 from tqdm import tqdm
@@ -16,9 +16,7 @@ from masrel.lab.cli._study_options import (
     warnings_as_notes,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-
-if TYPE_CHECKING:
-    from masrel.lab.run import SessionSummary
+from masrel.lab.run import SessionSummary, SimulatedGrades, run_session
 
 
 @click.command("run")
@@ -52,8 +50,6 @@ def run(
     The rater sees only blinded codes. A rehearsal (--rehearse) has a different order
     and different codes; its log and recordings are kept in STUDY/rehearsals.
     """
-    from masrel.lab.run import SimulatedGrades, run_session
-
     n_presentations = len(protocol.models) * protocol.schedule.repeats
     # A person's prompts count the presentations themselves.
     hidden = output.quiet or grades != "simulated"
@@ -83,7 +79,7 @@ def run(
         click.echo(_completed(done, grades))
 
 
-def _completed(done: "SessionSummary", grades: str) -> str:
+def _completed(done: SessionSummary, grades: str) -> str:
     made = "simulated" if grades == "simulated" else "simulated device"
     label = f" ({made})" if done.simulated else ""
     n_missing = done.n_presentations - done.n_graded

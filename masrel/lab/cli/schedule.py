@@ -7,7 +7,15 @@ import click
 from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.lab.cli._study_options import of_study
+from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.report._material import FIGURES
+from masrel.lab.report._order_tables import count_tables, order_document, summary_table
+from masrel.lab.schedule import copy_for_site, site_of_copy
+from masrel.lab.schedule._secret import rater_sessions_at
+from masrel.lab.schedule.sheets import _order_balance
+from masrel.lab.sealing import is_sealed
+from masrel.plots._drawn_values import Drawn
 
 
 @click.group("schedule", cls=Commands)
@@ -33,15 +41,6 @@ def _show(
 
     Shows the positions of each model, which model follows which, and runs.
     """
-    from masrel.lab.report._material import FIGURES
-    from masrel.lab.report._order_tables import (
-        count_tables,
-        order_document,
-        summary_table,
-    )
-    from masrel.lab.schedule.sheets import _order_balance
-    from masrel.plots._drawn_values import Drawn
-
     balances = _order_balance(protocol, paths, site)
     write_output(
         output,
@@ -67,8 +66,6 @@ def _show(
 )
 def _copy(paths: StudyPaths, protocol: Protocol, site: str, destination: Path) -> None:
     """Copy STUDY for a site, with only that site's secret."""
-    from masrel.lab.schedule import copy_for_site
-
     copy_for_site(protocol, paths, site, destination)
     click.echo(f"{destination}: a copy of the study with only the secret of {site}.")
 
@@ -90,11 +87,6 @@ def _draw(
     changed in what it presents, they are refused; --redraw draws them again, except
     those of sessions that have begun. A site's copy has the schedules of its raters.
     """
-    from masrel.lab.conduct import allot_schedules
-    from masrel.lab.schedule import site_of_copy
-    from masrel.lab.schedule._secret import rater_sessions_at
-    from masrel.lab.sealing import is_sealed
-
     site = site or site_of_copy(paths)
     written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))
     places = rater_sessions_at(protocol, site)

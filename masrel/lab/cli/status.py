@@ -1,7 +1,7 @@
 """``masrel status``: the progress of a study, and what to do next."""
 
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -9,10 +9,13 @@ from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import of_study
-
-if TYPE_CHECKING:
-    from masrel.lab.protocol import Protocol, StudyPaths
-    from masrel.tables._tables import Table
+from masrel.lab.conduct import PlanChange
+from masrel.lab.conduct._calibrations import calibration_notes
+from masrel.lab.progress import rater_progress, session_progress, study_status
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol._values import field_heading
+from masrel.lab.run._settings import moves_hardware
+from masrel.tables._tables import Column, Table, as_text, table_of
 
 
 @click.group("status", cls=Commands)
@@ -30,18 +33,12 @@ def status() -> None:
     json='Write JSON to this file; "-" writes it to standard output and prints nothing '
     "else."
 )
-def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> None:
+def _study(paths: StudyPaths, protocol: Protocol, output: OutputOptions) -> None:
     """Show the progress of STUDY: each session, other events, and the next step.
 
     Only the logs are read, and their hash chains are verified. Nothing is changed, and
     no model is named.
     """
-    from masrel.lab.conduct import PlanChange
-    from masrel.lab.conduct._calibrations import calibration_notes
-    from masrel.lab.progress import study_status
-    from masrel.lab.run._settings import moves_hardware
-    from masrel.tables._tables import as_text
-
     stands = study_status(paths, protocol)
     stands["device"] = [
         *calibration_notes(
@@ -80,9 +77,7 @@ _COUNTS = {
 }
 
 
-def _sessions_table(stands: dict[str, Any]) -> "Table":
-    from masrel.tables._tables import Column, table_of
-
+def _sessions_table(stands: dict[str, Any]) -> Table:
     absent = {
         rater["rater"]: f", {rater['status']}"
         for rater in stands["raters"]
@@ -160,10 +155,8 @@ def _minute(time_utc: str) -> str:
     "else.",
     csv="Print the list as CSV.",
 )
-def _raters(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> None:
+def _raters(paths: StudyPaths, protocol: Protocol, output: OutputOptions) -> None:
     """List the raters of STUDY, their progress, and what is known about them."""
-    from masrel.lab.progress import rater_progress, session_progress
-
     sessions = session_progress(paths, protocol)
     raters = rater_progress(paths, protocol, sessions)
     simulated = any(session.simulated for session in sessions)
@@ -186,11 +179,8 @@ def _raters(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) ->
 
 
 def _raters_table(
-    rows: list[dict[str, Any]], protocol: "Protocol", *, simulated: bool
-) -> "Table":
-    from masrel.lab.protocol._values import field_heading
-    from masrel.tables._tables import Column, table_of
-
+    rows: list[dict[str, Any]], protocol: Protocol, *, simulated: bool
+) -> Table:
     has_sites = any(row["site"] for row in rows)
     columns = (
         Column(key="rater", heading="Rater", align="left"),

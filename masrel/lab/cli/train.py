@@ -1,7 +1,7 @@
 """``masrel train``: teach a rater on models of known grade, until a test is passed."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
@@ -22,10 +22,17 @@ from masrel.lab.cli._study_options import (
     of_study,
     warnings_as_notes,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.protocol import Protocol, StudyPaths
-    from masrel.lab.training import Lesson
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.report._training import (
+    NOT_RATINGS,
+    learning_content,
+    outcome,
+    training_document,
+    training_page,
+    training_stamp,
+    training_tables,
+)
+from masrel.lab.training import Lesson, SimulatedTrainee, read_training, train_rater
 
 _WIDTH = 88  # of notes below a table
 
@@ -45,8 +52,8 @@ def train() -> None:
 @clock_option
 @output_options(quiet="Do not print the closing line.")
 def _train(
-    paths: "StudyPaths",
-    protocol: "Protocol",
+    paths: StudyPaths,
+    protocol: Protocol,
     rater: str,
     grades: Literal["console", "simulated"],
     clock: Literal["real", "simulated"] | None,
@@ -58,9 +65,6 @@ def _train(
     The training is passed once kappa with these grades is high enough, by the test that
     [training] of the protocol sets. No grade of a training becomes a rating of STUDY.
     """
-    from masrel.lab.report._training import NOT_RATINGS, outcome
-    from masrel.lab.training import SimulatedTrainee, train_rater
-
     with warnings_as_notes():
         record = train_rater(
             paths,
@@ -77,7 +81,7 @@ def _train(
         )
 
 
-def _show_grade(lesson: "Lesson") -> None:
+def _show_grade(lesson: Lesson) -> None:
     if lesson.grade == lesson.intended:
         click.echo(f"Right: {lesson.intended}.\n")
     else:
@@ -101,23 +105,14 @@ def _show_grade(lesson: "Lesson") -> None:
     csv="Print the learning curve as CSV with all digits.",
 )
 def _show(
-    paths: "StudyPaths",
-    protocol: "Protocol",
+    paths: StudyPaths,
+    protocol: Protocol,
     rater: str,
     level: float,
     page: Path | None,
     output: OutputOptions,
 ) -> None:
     """Show the training of one rater of STUDY so far, without presenting a model."""
-    from masrel.lab.report._training import (
-        learning_content,
-        training_document,
-        training_page,
-        training_stamp,
-        training_tables,
-    )
-    from masrel.lab.training import read_training
-
     record = read_training(paths, protocol, rater)
     curve, confusion = training_tables(record, level=level)
     write_output(

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -21,9 +20,18 @@ from masrel.errors import ParameterError
 from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import echo_stamp, stamp_option, warnings_as_notes
 from masrel.lab.protocol import StudyPaths
-
-if TYPE_CHECKING:
-    from masrel.lab.verification import Anchor, Finding, SessionRecord, Verification
+from masrel.lab.verification import (
+    Anchor,
+    Finding,
+    SessionRecord,
+    Verification,
+    anchor_findings,
+    anchors_of,
+    read_anchors,
+    read_stamp,
+    verify_study,
+    write_anchors,
+)
 
 
 @click.command("verify")
@@ -66,8 +74,6 @@ def verify(
     that makes it again is named; the exit code is 1 if nothing is broken. Doubt: there
     may be an innocent reason; the exit code is 0, as without findings.
     """
-    from masrel.lab.verification import anchors_of, verify_study
-
     if not study.is_dir():
         raise ParameterError(f"{study}: needed the folder of a study, got none")
     paths = StudyPaths(study)
@@ -87,10 +93,8 @@ def verify(
 
 
 def _anchored(
-    study: StudyPaths, file: Path | None, anchors: "tuple[Anchor, ...]"
-) -> "Iterable[Finding]":
-    from masrel.lab.verification import anchor_findings, read_anchors, write_anchors
-
+    study: StudyPaths, file: Path | None, anchors: tuple[Anchor, ...]
+) -> Iterable[Finding]:
     if file is None:
         return ()
     if file.resolve().is_relative_to(study.root.resolve()):
@@ -121,8 +125,6 @@ def _anchored(
 
 
 def _say_stamp(file: Path, service: str | None, authority: Path | None) -> None:
-    from masrel.lab.verification import read_stamp
-
     echo_stamp(file, service)
     if service is None and (time := read_stamp(file, authority)) is not None:
         by = "" if authority is None else f" by {authority}"
@@ -130,7 +132,7 @@ def _say_stamp(file: Path, service: str | None, authority: Path | None) -> None:
 
 
 def _document(
-    verification: "Verification", anchors: "tuple[Anchor, ...]"
+    verification: Verification, anchors: tuple[Anchor, ...]
 ) -> dict[str, object]:
     document = {
         "is_whole": verification.is_whole,
@@ -141,7 +143,7 @@ def _document(
     return {**document, "anchors": [dataclasses.asdict(anchor) for anchor in anchors]}
 
 
-def _line_of(record: "SessionRecord", *, is_training: bool) -> str:
+def _line_of(record: SessionRecord, *, is_training: bool) -> str:
     # how far a session, a rehearsal or a training came, which has no schedule
     which = f"{record.session} {record.rater}"
     if record.rehearsal is not None:
@@ -161,8 +163,8 @@ def _line_of(record: "SessionRecord", *, is_training: bool) -> str:
 
 def _show(
     study: Path,
-    verification: "Verification",
-    anchors: "tuple[Anchor, ...]",
+    verification: Verification,
+    anchors: tuple[Anchor, ...],
     n: Mapping[str, int],
 ) -> None:
     for record in (*verification.sessions, *verification.rehearsals):

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import compress
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from masrel.lab.elbow import Outline
+from masrel.lab.report._trace_section import MeasuredPanel
 from masrel.plots._style import (
     BANDS,
     BLACK,
@@ -28,10 +30,6 @@ from masrel.plots._traces import (
     name_traces,
     phase_handles,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.elbow import Outline
-    from masrel.lab.report._trace_section import MeasuredPanel
 
 _SMALL_IN_A_ROW = 4
 _GRADED = 2.2  # times as wide is a line of a stretch that a grade rests on
@@ -112,7 +110,7 @@ def _small_panels(panels: Sequence[TracePanel]) -> tuple[Figure, NDArray[Any]]:
     return figure, grid
 
 
-def measured_figure(panels: "Sequence[MeasuredPanel]") -> Figure:
+def measured_figure(panels: Sequence[MeasuredPanel]) -> Figure:
     """Return the torque that was sent and that was measured, above the angle."""
     figure, grid = _grid(len(panels), 2)
     looks: dict[str, dict[str, Any]] = {
@@ -221,7 +219,7 @@ _NUMERALS = ("i", "ii", "iii", "iv")
 
 
 def schematic_figure(
-    title: str, line: "Outline", levels: tuple[float, float, float], name: str
+    title: str, line: Outline, levels: tuple[float, float, float], name: str
 ) -> Figure:
     """Return the torque of a stretch against time, the parts of its catch named."""
     # levels: torque before, at and after the peak, N·m; name: what the last is above

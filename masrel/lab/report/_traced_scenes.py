@@ -8,17 +8,30 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
+
+import numpy as np
 
 from masrel._input import refuse
 from masrel.errors import ParameterError
+from masrel.lab import elbow
+from masrel.lab.elbow import (
+    ElbowParameters,
+    JointModel,
+    Motion,
+    Outline,
+    evaluate,
+    outline,
+    residual_torque,
+    tardieu,
+    times_at,
+    trace,
+)
+from masrel.lab.elbow._torque import line
+from masrel.lab.elbow.tone import ToneModel
 from masrel.lab.recording import PHASES, _Floats
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import aligned, fixed_or_significant, significant
-
-if TYPE_CHECKING:
-    from masrel.lab.elbow import ElbowParameters, JointModel, Motion, Outline
-    from masrel.lab.elbow.tone import ToneModel
 
 _FIGURES = "masrel.lab.report._stretch_figures:"
 
@@ -52,8 +65,8 @@ class Scene:
     # start_deg, end_deg: where it starts and ends
     start_deg: float
     end_deg: float
-    joint: "JointModel"
-    motion: "Motion"
+    joint: JointModel
+    motion: Motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +80,6 @@ class Quantities:
 
 def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and what else was requested."""
-    from masrel.lab.elbow import ElbowParameters
-
     joint, motion, kind = scene.joint, scene.motion, {}
     if isinstance(joint, ElbowParameters):
         events = _of_elbow(joint, motion, quantities)
@@ -93,10 +104,8 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
 
 
 def _of_elbow(
-    joint: "ElbowParameters", motion: "Motion", quantities: Quantities
+    joint: ElbowParameters, motion: Motion, quantities: Quantities
 ) -> dict[str, object]:
-    from masrel.lab import elbow
-
     events, outputs = elbow.events(joint, motion), {}
     for name in quantities.outputs:
         number = getattr(elbow, name.replace("-", "_"))(joint, motion)
@@ -125,12 +134,8 @@ def _of_elbow(
 
 
 def _of_tone(
-    joint: "ToneModel", motion: "Motion", quantities: Quantities
+    joint: ToneModel, motion: Motion, quantities: Quantities
 ) -> dict[str, object]:
-    import numpy as np
-
-    from masrel.lab.elbow import times_at, trace
-
     late = [t for t in quantities.times if not 0.0 <= t <= motion.duration]
     refuse(
         (quantities.outputs, f"--output: needs spastic elbows, got {joint.kind}"),
@@ -293,8 +298,6 @@ def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
         return Drawn(_FIGURES + "catch_figure", (curves,))
     if view == "schematic":
         return Drawn(_FIGURES + "schematic_figure", _schematic(scenes[0]))
-    from masrel.lab.elbow._torque import line
-
     panels = tuple(
         (
             *(name, [line(scene.joint, scene.motion) for scene in of]),
@@ -305,9 +308,7 @@ def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
     return Drawn(_FIGURES + "trace_figure", (panels, view))
 
 
-def _elbows(scenes: Sequence[Scene]) -> list["ElbowParameters"]:
-    from masrel.lab.elbow import ElbowParameters
-
+def _elbows(scenes: Sequence[Scene]) -> list[ElbowParameters]:
     joints = [scene.joint for scene in scenes]
     return [joint for joint in joints if isinstance(joint, ElbowParameters)]
 
@@ -319,9 +320,7 @@ def _label(scene: Scene) -> str:
 
 def _schematic(
     scene: Scene,
-) -> "tuple[str, Outline, tuple[float, float, float], str]":
-    from masrel.lab.elbow import outline, residual_torque
-
+) -> tuple[str, Outline, tuple[float, float, float], str]:
     (joint,) = _elbows([scene])
     line = outline(joint, scene.motion)
     if line.events.catch_speed is None or line.events.peak_end is None:
@@ -335,10 +334,6 @@ def _schematic(
 
 
 def _catches(name: str, scenes: Sequence[Scene]) -> tuple[object, ...]:
-    import numpy as np
-
-    from masrel.lab.elbow import evaluate
-
     joints, motions = _elbows(scenes), [scene.motion for scene in scenes]
     names = ("mean_speed", "catch_angle", "catch", "catch_end")
     outputs = evaluate(joints, motions, names)
@@ -372,12 +367,10 @@ def _catches(name: str, scenes: Sequence[Scene]) -> tuple[object, ...]:
 
 
 def tardieu_document(
-    model: str, joint: "JointModel", start_deg: float, speeds: Sequence[float]
+    model: str, joint: JointModel, start_deg: float, speeds: Sequence[float]
 ) -> dict[str, object]:
     """Return R2, R1, their difference and the catch at V1, V2 and V3 of a joint."""
     # speeds: V1, V2 and V3, deg/s
-    from masrel.lab.elbow import tardieu
-
     first, second, third = map(math.radians, speeds)
     made = tardieu(
         joint, start_angle=math.radians(start_deg), speeds=(first, second, third)

@@ -3,9 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from masrel.errors import ParameterError
+from masrel.lab.hess import PresentationStatus
 from masrel.lab.protocol import (
     PresentationRules,
     Question,
@@ -14,9 +15,6 @@ from masrel.lab.protocol import (
 from masrel.lab.protocol._values import Answer
 from masrel.lab.run._state import Felt
 from masrel.lab.schedule import Presentation
-
-if TYPE_CHECKING:
-    from masrel.lab.hess import PresentationStatus  # loads numpy
 
 MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any more
 
@@ -87,7 +85,7 @@ class GradeRequest:
     practice: bool = False
     sealed: bool = False
     rules: PresentationRules = field(default_factory=PresentationRules)
-    status: "PresentationStatus | None" = None
+    status: PresentationStatus | None = None
     n_stretches: int = 0
     felt: Felt | None = None
     grip_lost: bool | None = None

@@ -4,9 +4,11 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, ClassVar, TextIO
+from typing import ClassVar, TextIO
 
 from masrel.errors import ParameterError, SessionLogError, SessionStoppedError
+from masrel.lab.hess import EmergencyStop, PresentationStatus
+from masrel.lab.hess._stop import enter_on_empty_line, stop_on_key
 from masrel.lab.protocol import PresentationRules, Question
 from masrel.lab.protocol._values import Answer, checked_answer
 from masrel.lab.run._grade_sources import (
@@ -20,9 +22,6 @@ from masrel.lab.run._grade_sources import (
 )
 from masrel.lab.run._state import FROM_PAPER
 from masrel.scales import Scale, published_scale
-
-if TYPE_CHECKING:
-    from masrel.lab.hess import EmergencyStop, PresentationStatus  # loads numpy
 
 _CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
 
@@ -411,10 +410,8 @@ def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:
 
 
 @contextmanager
-def _at_terminal(request: GradeRequest, stop: "EmergencyStop") -> Iterator[None]:
+def _at_terminal(request: GradeRequest, stop: EmergencyStop) -> Iterator[None]:
     """Listen to the keys of the terminal: any but Enter is an emergency stop."""
-    from masrel.lab.hess._stop import enter_on_empty_line, stop_on_key  # loads numpy
-
     rules, status = request.rules, request.status
     with ExitStack() as stack:
         enter: Callable[[], object] = lambda: None  # noqa: E731 - nothing at all
@@ -429,7 +426,7 @@ def _at_terminal(request: GradeRequest, stop: "EmergencyStop") -> Iterator[None]
 
 @contextmanager
 def _cues_shown(
-    rules: PresentationRules, status: "PresentationStatus", keys: TextIO | None
+    rules: PresentationRules, status: PresentationStatus, keys: TextIO | None
 ) -> Iterator[None]:
     """Show a person at a terminal the next cue when a stretch is over."""
     cues = _cues_in_words(rules)

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from masrel.errors import (
     MasrelError,
@@ -25,6 +25,7 @@ from masrel.errors import (
     SessionLogInUseError,
     SessionStoppedError,
 )
+from masrel.lab.hess import EmergencyStop
 from masrel.lab.hess._clock import may_use
 from masrel.lab.protocol import ScaleDefinition, StudyPaths, read_protocol
 from masrel.lab.protocol._values import Answer, checked_answer
@@ -39,9 +40,6 @@ from masrel.lab.run import (
 from masrel.lab.run._grade_sources import checked_grade, remarks_on
 from masrel.lab.run.console import _stopped
 from masrel.scales import Scale, published_scale
-
-if TYPE_CHECKING:
-    from masrel.lab.hess import EmergencyStop
 
 Message = dict[str, Any]
 """One message; ``kind`` says what it is."""
@@ -116,7 +114,7 @@ class PageGrades(GradeSource):
             self._news.notify()
 
     @contextmanager
-    def listening(self, request: GradeRequest, stop: "EmergencyStop") -> Iterator[None]:
+    def listening(self, request: GradeRequest, stop: EmergencyStop) -> Iterator[None]:
         """Let the page press the stop, or say done, while a model is presented."""
         with self._news:
             self._presented = request, stop
@@ -277,7 +275,7 @@ class PageGrades(GradeSource):
         self._channel.send("corrected", **correction)
 
 
-def _is_for_now(message: Message, request: GradeRequest, stop: "EmergencyStop") -> bool:
+def _is_for_now(message: Message, request: GradeRequest, stop: EmergencyStop) -> bool:
     # heeds what is about the presentation that goes on -> whether that was all
     kind, status = message["kind"], request.status
     if kind == "stop" or message is _GONE:
