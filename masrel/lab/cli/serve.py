@@ -3,16 +3,12 @@
 import importlib.util
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from masrel.errors import ParameterError
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.protocol.content import _refuse_unknown_coefficients
-
-if TYPE_CHECKING:
-    from masrel.lab.serve._access import Access
 
 PORT = 8723
 """The default port, always the same: a tablet finds the pages again."""
@@ -80,20 +76,7 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
                 err=True,
             )
         serving = _server.serve(
-            SessionManager(paths), access, listener, context, show=lambda: _show(access)
+            SessionManager(paths), access, listener, context, show=access.show_addresses
         )
         if not asyncio.run(serving):
             raise KeyboardInterrupt
-
-
-def _show(access: "Access") -> None:
-    """Print addresses that have not been opened yet."""
-    from masrel.lab.serve._access import ROLES, qr_lines
-
-    for role in ROLES:
-        address = access.new_address(role)
-        click.echo(f"{role}: {address}")
-        if sys.stdout.isatty():
-            click.echo(qr_lines(address))
-    enter = "Enter: new ones. " if sys.stdin is not None and sys.stdin.isatty() else ""
-    click.echo(f"Each address lets in one browser, once. {enter}Ctrl-C: stop.")

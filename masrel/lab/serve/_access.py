@@ -5,6 +5,7 @@ import io
 import json
 import re
 import secrets
+import sys
 import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping
@@ -107,6 +108,17 @@ class Access:
             self._tokens.remove(of_role[0])
         self._tokens.append(token)
         return f"{self.origin}/{role}?token={token.text}"
+
+    def show_addresses(self) -> None:
+        """Print an address for each role, which nobody has opened yet."""
+        for role in ROLES:
+            address = self.new_address(role)
+            self.say(f"{role}: {address}")
+            if sys.stdout.isatty():
+                self.say(qr_lines(address))
+        has_keys = sys.stdin is not None and sys.stdin.isatty()
+        enter = "Enter: new ones. " if has_keys else ""
+        self.say(f"Each address lets in one browser, once. {enter}Ctrl-C: stop.")
 
     def let_in(self, role: Role, token: str, client: str) -> Visitor:
         """Return whom an address lets in, which it does once; say so at the terminal.
