@@ -16,10 +16,9 @@ from masrel.lab.conduct._study_log import (
     past_day,
     stated,
 )
-from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol import Protocol, Question, Questionnaire, StudyPaths
 from masrel.lab.protocol._values import checked_answer
 from masrel.lab.run._days import log_interval
-from masrel.lab.run._questions import question_named
 from masrel.lab.run._state import SessionState, replay
 
 
@@ -166,7 +165,7 @@ def record_answer(
     OSError
         If the log cannot be written.
     """
-    questionnaire, its_question = question_named(protocol, question)
+    questionnaire, its_question = _question_named(protocol, question)
     if answer is not None:
         answer = checked_answer(its_question, answer, where=f"answer to {question}")
     if (code is not None) != (questionnaire.when == "presentation"):
@@ -315,3 +314,17 @@ def _check_code(path: Path, code: str, known: Iterable[str], what: str) -> None:
             f"{path}: needed a code that {what} ({', '.join(known) or 'none'}), "
             f"got {code!r}"
         )
+
+
+def _question_named(protocol: Protocol, name: str) -> tuple[Questionnaire, Question]:
+    # what ``questionnaire.question`` names
+    known = {
+        f"{questionnaire.id}.{question.id}": (questionnaire, question)
+        for questionnaire in protocol.questionnaires
+        for question in questionnaire.questions
+    }
+    if name not in known:
+        raise ParameterError(
+            f"question: needed one of {', '.join(known) or 'none'}, got {name!r}"
+        )
+    return known[name]

@@ -1,18 +1,15 @@
-"""What a source of grades is, and the one that reads them off a script."""
+"""What a source of grades and answers is, and how a question is put to it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 from masrel.errors import ParameterError
+from masrel.lab._study_files import Fact
 from masrel.lab.hess import PresentationStatus
-from masrel.lab.protocol import (
-    PresentationRules,
-    Question,
-    Questionnaire,
-)
-from masrel.lab.protocol._values import Answer
+from masrel.lab.protocol import PresentationRules, Protocol, Question, Questionnaire
+from masrel.lab.protocol._values import Answer, When, checked_answer, questions_of
 from masrel.lab.run._state import Felt
 from masrel.lab.schedule import Presentation
 
@@ -229,3 +226,44 @@ class GradeSource:
     def answer(self, request: QuestionRequest) -> Answer:  # noqa: ARG002 - as all
         """Return the answer, or None for none."""
         return None
+
+
+def ask_questions(
+    protocol: Protocol,
+    when: When,
+    source: GradeSource,
+    *,
+    rater: str,
+    session: str,
+    presentation: Presentation | None = None,
+    answered: Container[tuple[str, str]] = (),
+    correct: Correct | None = None,
+    log: Callable[[dict[str, Fact]], object],
+) -> None:
+    """Ask what has no answer yet, and log each answer before the next question."""
+    for questionnaire, question in questions_of(protocol, when):
+        if (questionnaire.id, question.id) in answered:
+            continue
+        request = QuestionRequest(
+            rater=rater,
+            session=session,
+            questionnaire=questionnaire,
+            question=question,
+            presentation=presentation,
+            correct=correct,
+        )
+        answer = checked_answer(question, source.answer(request), where=_place(request))
+        log(
+            {
+                "questionnaire": questionnaire.id,
+                "question": question.id,
+                "answer": answer,
+            }
+        )
+
+
+def _place(request: QuestionRequest) -> str:
+    # which answer, in a message
+    name = f"{request.questionnaire.id}.{request.question.id}"
+    of = "" if request.presentation is None else f" of {request.presentation.code}"
+    return f"answer to {name}{of} by {request.rater} in session {request.session}"

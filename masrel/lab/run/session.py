@@ -36,10 +36,15 @@ from masrel.lab.run._days import (
     interval_fields,
     last_time,
 )
-from masrel.lab.run._grade_sources import GradeRequest, GradeSource, OnSheet, Skip
+from masrel.lab.run._grade_sources import (
+    GradeRequest,
+    GradeSource,
+    OnSheet,
+    Skip,
+    ask_questions,
+)
 from masrel.lab.run._present import spool_of
 from masrel.lab.run._presenter import CLOCKS, ClockName, Presenter, check_same
-from masrel.lab.run._questions import ask_questions
 from masrel.lab.run._rehearsal import (
     RehearsalPaths,
     begin_rehearsal,
