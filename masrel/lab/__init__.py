@@ -21,17 +21,18 @@ if TYPE_CHECKING:
     from masrel.lab.analysis import analyze
     from masrel.lab.protocol import StudyPaths, read_protocol
     from masrel.lab.ratings import read_study_data
-    from masrel.lab.report import write_report
-    from masrel.lab.run import SimulatedGrades, run_session
+    from masrel.lab.report._document import write_report
+    from masrel.lab.run._simulated_raters import SimulatedGrades
+    from masrel.lab.run.session import run_session
 
 _HOMES = {
-    "SimulatedGrades": "run",
+    "SimulatedGrades": "run._simulated_raters",
     "StudyPaths": "protocol",
     "analyze": "analysis",
     "read_protocol": "protocol",
     "read_study_data": "ratings",
-    "run_session": "run",
-    "write_report": "report",
+    "run_session": "run.session",
+    "write_report": "report._document",
 }
 
 __all__ = [

@@ -21,7 +21,6 @@ PROTOCOL_PAGE = DOCS / "protocol.md"
 API = (DOCS / "api" / "index.md").read_text("utf-8")
 MODULES = re.findall(r"^   (masrel[\w.]*)$", API, re.M)
 PROMISED = Path(__file__).with_name("public_names.txt").read_text("utf-8").split()
-MADE_BY_A_METHOD = {"masrel.lab.run.SessionLog"}  # never called: its `open` is
 LEFT_OUT = {"EX01", "SA01", "ES01", "GL01", "GL08", "RT02"}
 
 
@@ -49,8 +48,7 @@ def faults(name: str) -> list[str]:
     codes = {
         code: text for code, text in validate(name)["errors"] if code not in LEFT_OUT
     }
-    is_called = name not in MADE_BY_A_METHOD
-    if fields(thing) or getattr(thing, "_is_protocol", False) or not is_called:
+    if fields(thing) or getattr(thing, "_is_protocol", False):
         codes.pop("PR01", None)  # is of calls; fields are attributes
     listed = inspect.getdoc(thing) or ""
     if (

@@ -56,7 +56,7 @@ LOADS_NO: dict[str, set[str]] = {
     },
     # of the laboratory what comes before the ratings
     "import masrel.agreement, masrel.intervals, masrel.lab.elbow, masrel.lab.hess\n"
-    "import masrel.lab.protocol, masrel.lab.schedule, masrel.lab.run": HEAVY,
+    "import masrel.lab.protocol, masrel.lab.schedule, masrel.lab.run.session": HEAVY,
     "import numpy, masrel.agreement as m\n"
     "for kappa in (m.fleiss_kappa, m.gwet_ac, m.cohen_kappa):\n"
     "    kappa(numpy.array([[1, 1], [1, 2], [2, 2]]), weights='quadratic')": (

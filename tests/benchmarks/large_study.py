@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from unittest import mock
 
+from masrel.lab._event_log import SessionLog, read_log
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
@@ -16,7 +17,8 @@ from masrel.lab.protocol import (
 )
 from masrel.lab.ratings import ratings_from_logs, write_ratings
 from masrel.lab.recording import read_recording, write_recording
-from masrel.lab.run import SessionLog, SimulatedGrades, read_log, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule, write_schedules
 
 PER_RATER = 16  # four models, four times each

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from masrel.errors import ParameterError
-from masrel.lab.run import GradeRequest, GradeSource, QuestionRequest
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, QuestionRequest
 
 Answer = str | int | float | None
 

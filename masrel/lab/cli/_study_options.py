@@ -16,7 +16,7 @@ from masrel.errors import MasrelWarning, MissingLettersWarning
 if TYPE_CHECKING:
     from masrel.lab.protocol import Protocol
     from masrel.lab.ratings import StudyData
-    from masrel.lab.run import GradeSource
+    from masrel.lab.run._grade_sources import GradeSource
 
 study_argument = click.argument("study", type=click.Path(path_type=Path))
 
@@ -74,7 +74,7 @@ def grading(
 ) -> "dict[str, Any]":
     """Return the source of grades, and the clock, that a command runs with."""
     from masrel.lab.protocol import scale_of
-    from masrel.lab.run import ConsoleGrades, PaperGrades
+    from masrel.lab.run.console import ConsoleGrades, PaperGrades
 
     persons = {"console": ConsoleGrades, "paper": PaperGrades}
     if grades in persons:

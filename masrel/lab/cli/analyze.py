@@ -17,8 +17,8 @@ from masrel.lab.analysis import Analysis
 from masrel.lab.cli._gating import GateOptions, conclude, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 from masrel.lab.ratings import StudyData
-from masrel.lab.report import StudyConduct, study_conduct
 from masrel.lab.report._agreement import estimate_tables, judge_tables
+from masrel.lab.report._conduct import StudyConduct, study_conduct
 from masrel.lab.report._document import made_section
 from masrel.lab.report._grade_sections import felt_sentences
 from masrel.lab.report._material import gather, lacking

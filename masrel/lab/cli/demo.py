@@ -20,8 +20,10 @@ from masrel.lab.ratings import (
     write_answers,
     write_ratings,
 )
-from masrel.lab.report import study_conduct, write_report
-from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.report._conduct import study_conduct
+from masrel.lab.report._document import write_report
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule._secret import N_BYTES, SECRET_TEXT
 
 # Of what is in the log of the study: the same each time, as reports have it

@@ -30,7 +30,12 @@ from masrel.lab.conduct import (
 from masrel.lab.conduct._statements import NoteKind, Standing
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol.study import _OPENED
-from masrel.lab.run import record_answer, record_correction, record_day, record_skip
+from masrel.lab.run._corrections import (
+    record_answer,
+    record_correction,
+    record_day,
+    record_skip,
+)
 from masrel.lab.sealing import unseal_study
 
 

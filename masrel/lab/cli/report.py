@@ -285,7 +285,7 @@ def _made(
     from tqdm import tqdm
 
     from masrel.lab.analysis import analyze
-    from masrel.lab.report import study_conduct
+    from masrel.lab.report._conduct import study_conduct
     from masrel.lab.report._document import make_report, section_names
     from masrel.lab.report._material import gather
     from masrel.lab.report._pages import CONVERTED, pandoc_version

@@ -16,7 +16,8 @@ from masrel.lab.cli._study_options import (
     warnings_as_notes,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run import SessionSummary, SimulatedGrades, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import SessionSummary, run_session
 
 
 @click.command("run")

@@ -15,6 +15,7 @@ from typing import Any
 
 from masrel._input import check_option, listed
 from masrel.errors import ParameterError
+from masrel.lab._event_log import read_log
 from masrel.lab._study_files import (
     CUT_OFF,
     MANIFEST,
@@ -34,7 +35,6 @@ from masrel.lab.ratings import (
     ratings_csv,
     read_study_data,
 )
-from masrel.lab.run import read_log
 
 MISSING = "NA"
 """How tables of masrel show a missing value."""

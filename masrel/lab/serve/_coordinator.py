@@ -32,7 +32,7 @@ from masrel.lab.conduct import (
 from masrel.lab.conduct._study_log import check_choice, check_rater
 from masrel.lab.progress import study_status
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.run import record_answer, record_day, record_skip
+from masrel.lab.run._corrections import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
 from masrel.lab.sealing import is_sealed

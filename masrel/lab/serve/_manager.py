@@ -20,7 +20,7 @@ from typing import Any
 from masrel.errors import MasrelError, ParameterError
 from masrel.lab.conduct._study_log import check_choice
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import record_correction
+from masrel.lab.run._corrections import record_correction
 from masrel.lab.run._presenter import ClockName
 from masrel.lab.serve._session_process import MAX_LINE, Message, encoded
 
@@ -276,13 +276,13 @@ class SessionManager:
     ) -> None:
         """Correct a grade, of the session that runs or of another one.
 
-        What it should have been as `masrel.lab.run.record_correction` takes it.
+        What it should have been as `record_correction` takes it.
 
         Raises
         ------
         MasrelError
-            As `masrel.lab.run.record_correction` raises it, or if a model is presented
-            in that session now.
+            As `record_correction` raises it, or if a model is presented in that session
+            now.
         """
         running = self._running
         if self.running != (rater, session, rehearsal) or running is None:

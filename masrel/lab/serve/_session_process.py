@@ -29,16 +29,17 @@ from masrel.lab.hess import EmergencyStop
 from masrel.lab.hess._clock import may_use
 from masrel.lab.protocol import ScaleDefinition, StudyPaths, read_protocol
 from masrel.lab.protocol._values import Answer, checked_answer
-from masrel.lab.run import (
+from masrel.lab.run._grade_sources import (
     GradeRequest,
     GradeSource,
     QuestionRequest,
     Skip,
     StretchGrade,
-    run_session,
+    checked_grade,
+    remarks_on,
 )
-from masrel.lab.run._grade_sources import checked_grade, remarks_on
 from masrel.lab.run.console import _stopped
+from masrel.lab.run.session import run_session
 from masrel.scales import Scale, published_scale
 
 Message = dict[str, Any]

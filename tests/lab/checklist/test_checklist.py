@@ -20,7 +20,8 @@ from masrel.lab.checklist import (
 )
 from masrel.lab.conduct import record_standing
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.run import record_correction, run_session
+from masrel.lab.run._corrections import record_correction
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule
 from tests.lab.run.conftest import new_study, small
 from tests.lab.script import ScriptGrades

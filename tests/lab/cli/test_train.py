@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from masrel.agreement import cohen_kappa
+from masrel.lab._event_log import read_log
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs
-from masrel.lab.run import SimulatedGrades, read_log, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import write_schedules
 from masrel.lab.training import (
     SimulatedTrainee,

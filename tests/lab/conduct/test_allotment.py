@@ -172,7 +172,7 @@ def test_another_row_than_the_log_has_is_found(study: StudyPaths) -> None:
 
 def rewritten(study: StudyPaths, change: dict[str, object]) -> None:
     """Write the log anew, its chain whole, with a changed last event."""
-    from masrel.lab.run import SessionLog, read_log
+    from masrel.lab._event_log import SessionLog, read_log
 
     events = read_log(study.conduct_file)
     study.conduct_file.unlink()

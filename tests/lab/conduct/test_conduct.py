@@ -16,6 +16,7 @@ from masrel.errors import (
     SessionLogError,
     SessionLogInUseError,
 )
+from masrel.lab._event_log import SessionLog
 from masrel.lab.conduct import (
     Note,
     excluded_raters,
@@ -28,7 +29,8 @@ from masrel.lab.conduct import (
     record_unblinding,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.run import SessionLog, record_correction, run_session
+from masrel.lab.run._corrections import record_correction
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule
 from tests.files import edit
 from tests.lab.script import ScriptGrades

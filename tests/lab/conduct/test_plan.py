@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ParameterError
+from masrel.lab._event_log import read_log
 from masrel.lab.conduct import allot_schedules, plan_changes, record_amendment
 from masrel.lab.progress import rater_progress, session_progress
 from masrel.lab.protocol import (
@@ -17,7 +18,6 @@ from masrel.lab.protocol import (
     read_protocol,
 )
 from masrel.lab.ratings import study_remarks
-from masrel.lab.run import read_log
 from masrel.lab.verification import verify_study
 from tests.files import edit, small_study
 from tests.lab.flow.conftest import run

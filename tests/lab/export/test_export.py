@@ -19,8 +19,10 @@ from masrel.lab.conduct import record_standing
 from masrel.lab.export import EXPORT_FORMS, export_study
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import read_study_data
-from masrel.lab.report import study_conduct, write_report
-from masrel.lab.run import record_correction, run_session
+from masrel.lab.report._conduct import study_conduct
+from masrel.lab.report._document import write_report
+from masrel.lab.run._corrections import record_correction
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule, write_schedules
 from tests.lab.run.conftest import PROTOCOL
 from tests.lab.schedule.studies import with_secret

@@ -9,7 +9,8 @@ from click.testing import CliRunner
 from masrel.cli import cli
 from masrel.lab.conduct import record_standing
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from tests.files import edit
 from tests.lab.cli.test_train import new_study, train_simulated
 from tests.lab.schedule.studies import with_secret

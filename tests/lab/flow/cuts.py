@@ -21,10 +21,9 @@ from typing import Any
 
 import pytest
 
-from masrel.lab._event_log import events_before_torn
+from masrel.lab._event_log import Event, events_before_torn, read_log
 from masrel.lab._study_files import is_cut_off
 from masrel.lab.protocol import StudyPaths
-from masrel.lab.run import Event, read_log
 from masrel.lab.schedule._secret import find_secret
 
 NOTES = ".masrel_cache"  # of a report, beside it

@@ -14,7 +14,7 @@ import pytest
 
 from masrel.errors import ParameterError, RatingsError
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import record_correction
+from masrel.lab.run._corrections import record_correction
 from masrel.lab.verification import (
     anchor_findings,
     anchors_of,

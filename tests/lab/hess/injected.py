@@ -18,6 +18,7 @@ from unittest import mock
 import numpy as np
 
 from masrel.errors import OverrunWarning
+from masrel.lab._event_log import read_log
 from masrel.lab.hess import (
     Clock,
     Controller,
@@ -29,7 +30,9 @@ from masrel.lab.hess import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.recording import read_recording, write_recording
-from masrel.lab.run import SimulatedGrades, model_controller, read_log, run_session
+from masrel.lab.run._settings import model_controller
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import write_schedules
 
 from . import faults as f

@@ -21,7 +21,8 @@ from masrel.lab.merging import merge_studies
 from masrel.lab.paper import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs
-from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.training import SimulatedTrainee, train_rater
 from masrel.lab.verification import anchors_of, verify_study
 from tests.files import contents, edit

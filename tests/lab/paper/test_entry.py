@@ -18,6 +18,7 @@ from masrel.errors import (
     RatingsError,
     SessionLogError,
 )
+from masrel.lab._event_log import read_log
 from masrel.lab.analysis import analyze
 from masrel.lab.paper import SheetDifference, compare_sheet, enter_sheet, write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths
@@ -27,7 +28,7 @@ from masrel.lab.ratings import (
     read_study_data,
     study_remarks,
 )
-from masrel.lab.run import read_log, record_answer, record_correction
+from masrel.lab.run._corrections import record_answer, record_correction
 from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from tests.lab.paper.conftest import QUESTIONS

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import MasrelWarning, ParameterError
+from masrel.lab._event_log import read_log
 from masrel.lab.conduct import allot_schedules, record_amendment
 from masrel.lab.paper import enter_sheet, write_sheets
 from masrel.lab.progress import (
@@ -18,12 +19,9 @@ from masrel.lab.progress import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.lab.ratings import study_remarks
-from masrel.lab.run import (
-    PaperGrades,
-    read_log,
-    record_day,
-    run_session,
-)
+from masrel.lab.run._corrections import record_day
+from masrel.lab.run.console import PaperGrades
+from masrel.lab.run.session import run_session
 from tests.files import edit
 from tests.lab.script import ScriptGrades
 

@@ -18,7 +18,8 @@ from masrel.lab.progress import (
     session_progress,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run import record_correction, run_session
+from masrel.lab.run._corrections import record_correction
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule, write_schedules
 from tests.lab.script import ScriptGrades
 

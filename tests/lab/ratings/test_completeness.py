@@ -11,7 +11,8 @@ from masrel.cli import cli
 from masrel.lab.conduct import record_standing, record_unblinding
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs, study_remarks, write_ratings
-from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from tests.lab.run.conftest import PROTOCOL
 from tests.lab.schedule.studies import with_secret
 

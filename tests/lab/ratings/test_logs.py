@@ -6,12 +6,10 @@ from collections.abc import Callable
 import pytest
 
 from masrel.errors import RatingsError, SessionLogError
+from masrel.lab._event_log import SessionLog
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import rating_matrix, ratings_from_logs, write_ratings
-from masrel.lab.run import (
-    SessionLog,
-    run_session,
-)
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule
 from tests.lab.run.conftest import new_study, small
 from tests.lab.script import ScriptGrades

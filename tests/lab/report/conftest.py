@@ -2,7 +2,7 @@
 
 import pytest
 
-from masrel.lab.report import ReportFiles
+from masrel.lab.report._document import ReportFiles
 from tests.lab.report.pages import published_report, simulated_report
 
 

@@ -11,7 +11,7 @@ import msgspec
 from masrel.lab.analysis import analyze
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Ratings, ratings_from_rows
-from masrel.lab.report import ReportFiles, write_report
+from masrel.lab.report._document import ReportFiles, write_report
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.files import table_of
 from tests.lab.analysis.studies import in_person, plan, protocol_with, table_v

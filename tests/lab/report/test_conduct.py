@@ -14,8 +14,9 @@ from masrel.lab.conduct import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import read_study_data, write_ratings
-from masrel.lab.report import study_conduct, write_report
-from masrel.lab.run import run_session
+from masrel.lab.report._conduct import study_conduct
+from masrel.lab.report._document import write_report
+from masrel.lab.run.session import run_session
 from masrel.lab.verification import verify_study
 from tests.lab.run.conftest import new_study
 from tests.lab.script import ScriptGrades

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab.report import ReportFiles
+from masrel.lab.report._document import ReportFiles
 from tests.lab.report.pages import (
     HOSTILE,
     Page,

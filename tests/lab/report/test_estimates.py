@@ -12,7 +12,7 @@ import pytest
 from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import PlannedEstimate, analyze
 from masrel.lab.ratings import Ratings, ratings_from_rows
-from masrel.lab.report import ReportFiles, write_report
+from masrel.lab.report._document import ReportFiles, write_report
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.files import table_of
 from tests.lab.analysis.studies import of_session, plan, protocol_with, ratings, table_v

@@ -15,7 +15,7 @@ from masrel.lab.analysis import Speed, Speeds, SpeedSummary, analyze
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, outline
 from masrel.lab.protocol import read_protocol, scale_of
 from masrel.lab.ratings import read_study_ratings
-from masrel.lab.report import write_report
+from masrel.lab.report._document import write_report
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 from tests.benchmarks.many_ratings import many_ratings

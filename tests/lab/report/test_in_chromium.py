@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import pytest
 
 from masrel.cli import cli
-from masrel.lab.report import ReportFiles
+from masrel.lab.report._document import ReportFiles
 from tests.benchmarks.many_ratings import many_ratings
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")

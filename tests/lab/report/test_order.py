@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import ttest_1samp
 
 from masrel.lab.ratings import Ratings, ratings_from_rows
-from masrel.lab.report import ReportFiles
+from masrel.lab.report._document import ReportFiles
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.analysis.studies import protocol_with
 from tests.lab.report.pages import page, rows_of, written

@@ -15,7 +15,7 @@ from masrel.lab.ratings import (
     read_study_data,
     write_answers,
 )
-from masrel.lab.report import write_report
+from masrel.lab.report._document import write_report
 from tests.lab.analysis.studies import ratings
 from tests.lab.protocol.documents import changed, write
 

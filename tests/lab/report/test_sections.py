@@ -21,7 +21,7 @@ from masrel.lab.recording import (
     Recording,
     write_recording,
 )
-from masrel.lab.report import ReportFiles, write_report
+from masrel.lab.report._document import ReportFiles, write_report
 from masrel.lab.report._material import gather
 from masrel.scales import Scale
 from tests.lab.analysis.studies import (

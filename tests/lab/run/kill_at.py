@@ -23,7 +23,8 @@ from click.testing import CliRunner
 from masrel.cli import cli
 from masrel.lab.hess import SimulatedClock
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 
 FILE_CALLS = ("write", "fsync", "replace", "ftruncate")
 

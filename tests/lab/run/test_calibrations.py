@@ -18,9 +18,9 @@ from masrel.lab.conduct._calibrations import (
 from masrel.lab.hess import PlantParameters, SimulatedOptions, TorqueSensor
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.recording import read_recording
-from masrel.lab.report import study_conduct
-from masrel.lab.run import run_session
+from masrel.lab.report._conduct import study_conduct
 from masrel.lab.run._settings import calibrated
+from masrel.lab.run.session import run_session
 from masrel.lab.verification import verify_study
 from tests.lab.hess.rig import ScriptedDevice, present
 from tests.lab.script import ScriptGrades

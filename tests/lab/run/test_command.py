@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import DeviceError, SessionLogError
+from masrel.lab._event_log import read_log
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings import (
     Correction,
@@ -20,13 +21,9 @@ from masrel.lab.ratings import (
     study_remarks,
     write_ratings,
 )
-from masrel.lab.run import (
-    SimulatedGrades,
-    read_log,
-    record_correction,
-    record_skip,
-    run_session,
-)
+from masrel.lab.run._corrections import record_correction, record_skip
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from tests.cli.process import Caller, Done

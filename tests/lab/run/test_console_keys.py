@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from masrel.lab._event_log import read_log
 from masrel.lab.protocol import StudyPaths
-from masrel.lab.run import read_log
 from tests.lab.hess.injected import small_study
 
 # However late a busy machine is, that shall not end the presentation.

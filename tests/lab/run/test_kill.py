@@ -12,10 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from masrel.lab._event_log import Event, read_log
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import ratings_from_logs
 from masrel.lab.recording import read_recording
-from masrel.lab.run import Event, SimulatedGrades, read_log, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.verification import verify_study
 from tests.faults import Faults
 

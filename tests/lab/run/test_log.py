@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 from docs.make.pages import read
 from masrel.errors import SessionLogError
+from masrel.lab._event_log import SessionLog, read_log
 from masrel.lab.progress import SessionProgress, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run import SessionLog, read_log
 
 
 def noon() -> datetime:

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError, RatingsError
+from masrel.lab._event_log import Event, read_log
 from masrel.lab.elbow import tardieu
 from masrel.lab.hess import SimulatedHand
 from masrel.lab.protocol import (
@@ -31,14 +32,9 @@ from masrel.lab.ratings import (
     write_ratings,
 )
 from masrel.lab.recording import read_recording
-from masrel.lab.run import (
-    Event,
-    GradeRequest,
-    SimulatedGrades,
-    StretchGrade,
-    read_log,
-    run_session,
-)
+from masrel.lab.run._grade_sources import GradeRequest, StretchGrade
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from masrel.scales import MODIFIED_ASHWORTH

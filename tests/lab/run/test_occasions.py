@@ -14,6 +14,7 @@ from masrel.errors import (
     SessionLogError,
     SessionStoppedError,
 )
+from masrel.lab._event_log import Event, read_log
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings import (
     answers_from_logs,
@@ -22,15 +23,10 @@ from masrel.lab.ratings import (
     study_remarks,
 )
 from masrel.lab.recording import read_recording
-from masrel.lab.run import (
-    ConsoleGrades,
-    Event,
-    GradeRequest,
-    SessionSummary,
-    SimulatedGrades,
-    read_log,
-    run_session,
-)
+from masrel.lab.run._grade_sources import GradeRequest
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.console import ConsoleGrades
+from masrel.lab.run.session import SessionSummary, run_session
 from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from tests.lab.run.test_command import typed

@@ -23,20 +23,16 @@ from masrel.errors import (
     SessionLogError,
     SessionStoppedError,
 )
+from masrel.lab._event_log import read_log
 from masrel.lab.hess import SimulatedClock
 from masrel.lab.protocol import DeviceSettings, Protocol, StudyPaths
 from masrel.lab.ratings import ratings_from_logs
 from masrel.lab.recording import MEASURED_TORQUE, RECORDING_COLUMNS, read_recording
-from masrel.lab.run import (
-    ConsoleGrades,
-    GradeRequest,
-    GradeSource,
-    SessionSummary,
-    SimulatedGrades,
-    read_log,
-    record_correction,
-    run_session,
-)
+from masrel.lab.run._corrections import record_correction
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.console import ConsoleGrades
+from masrel.lab.run.session import SessionSummary, run_session
 from masrel.lab.schedule import read_schedule
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 from tests.lab.script import ScriptGrades

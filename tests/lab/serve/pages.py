@@ -23,9 +23,9 @@ import httpx
 from starlette.responses import JSONResponse
 from starlette.types import Message, Receive, Scope, Send
 
+from masrel.lab._event_log import read_log
 from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
-from masrel.lab.run import read_log
 from masrel.lab.serve import _access as access
 from masrel.lab.serve import _middleware as middleware
 from masrel.lab.serve._access import LIFE_S, ROLES, Access, Role

@@ -15,11 +15,13 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import DeviceError
+from masrel.lab._event_log import read_log
 from masrel.lab.conduct import read_conduct
 from masrel.lab.hess import EmergencyStop
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import read_recording
-from masrel.lab.run import GradeRequest, read_log, run_session
+from masrel.lab.run._grade_sources import GradeRequest
+from masrel.lab.run.session import run_session
 from masrel.lab.schedule import read_schedule
 from tests.lab.script import ScriptGrades
 from tests.lab.serve.pages import (

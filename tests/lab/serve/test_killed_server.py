@@ -13,10 +13,12 @@ import httpx
 import numpy as np
 import pytest
 
+from masrel.lab._event_log import read_log
 from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import read_recording
-from masrel.lab.run import SimulatedGrades, read_log, run_session
+from masrel.lab.run._simulated_raters import SimulatedGrades
+from masrel.lab.run.session import run_session
 from tests.benchmarks.bench_serve import Lateness, Stops, by_the_browser, long_study
 from tests.cli.process import Caller
 from tests.faults import Faults

@@ -13,9 +13,11 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ParameterError, SessionStoppedError
+from masrel.lab._event_log import read_log
 from masrel.lab.protocol import StudyPaths, read_protocol, scale_of
 from masrel.lab.ratings import answers_from_logs, ratings_from_logs
-from masrel.lab.run import ConsoleGrades, read_log, run_session
+from masrel.lab.run.console import ConsoleGrades
+from masrel.lab.run.session import run_session
 from tests.lab.serve.pages import (
     EACH,
     OCCASIONS,

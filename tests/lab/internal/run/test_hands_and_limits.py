@@ -32,7 +32,7 @@ from masrel.lab.protocol import (
     read_protocol,
 )
 from masrel.lab.recording import RECORDING_COLUMNS, Recording, stretches
-from masrel.lab.run import GradeRequest, SimulatedGrades
+from masrel.lab.run._grade_sources import GradeRequest
 from masrel.lab.run._present import StatusOfHand, _felt
 from masrel.lab.run._settings import (
     _largest_torque,
@@ -44,7 +44,7 @@ from masrel.lab.run._settings import (
     model_controller,
     moves_hardware,
 )
-from masrel.lab.run._simulated_raters import intended_speeds
+from masrel.lab.run._simulated_raters import SimulatedGrades, intended_speeds
 from masrel.lab.schedule import Presentation
 
 # Key of [device] to field of DeviceLimits, and what one unit of the key is there

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from masrel.agreement import cohen_kappa
+from masrel.lab._event_log import Event
 from masrel.lab.protocol import copy_template, presented_hash, read_protocol
-from masrel.lab.run import Event
 from masrel.lab.training import (
     Criterion,
     Lesson,

@@ -10,9 +10,9 @@ from typing import Any
 import tomli_w
 from playwright.sync_api import Browser
 
+from masrel.lab._event_log import Event, read_log
 from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
-from masrel.lab.run import Event, read_log
 from tests.lab.serve.browser.visitors import LOST, Coordinator, Rater, Visitor
 from tests.lab.serve.terminal import Server
 

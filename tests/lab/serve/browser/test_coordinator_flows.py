@@ -6,8 +6,9 @@ from datetime import datetime, timedelta
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
+from masrel.lab._event_log import read_log
 from masrel.lab.protocol import read_protocol
-from masrel.lab.run import read_log, run_session
+from masrel.lab.run.session import run_session
 from tests.lab.script import ScriptGrades
 from tests.lab.serve.browser.conftest import MakeStage, at_work
 from tests.lab.serve.browser.stages import Stage
