@@ -17,10 +17,11 @@ from scipy.optimize import brentq
 
 from docs.make.evidence import EVIDENCE, table, write_part
 from masrel.lab.protocol import Training
-from masrel.lab.training import Criterion, calibrate, confusion
+from masrel.lab.training._criterion import Criterion, calibrate
 from masrel.lab.training._trainees import (
     SKILLS,
     adaptive_weights,
+    confusion,
     confusion_with_kappa,
     draw_blocks,
     draw_grades,

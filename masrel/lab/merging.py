@@ -35,8 +35,8 @@ from masrel.lab.protocol import (
     read_protocol,
 )
 from masrel.lab.protocol.content import _content_differences
-from masrel.lab.schedule import read_schedule
 from masrel.lab.schedule._secret import find_secret
+from masrel.lab.schedule.presentation import read_schedule
 from masrel.lab.verification import verify_study
 
 __all__ = ["merge_studies"]

@@ -34,8 +34,7 @@ from masrel.lab.run._state import (
     read_session,
     replay,
 )
-from masrel.lab.schedule import site_of_copy
-from masrel.lab.schedule._secret import find_secret, rater_sessions_at
+from masrel.lab.schedule._secret import find_secret, rater_sessions_at, site_of_copy
 from masrel.lab.schedule.presentation import _read_drawn
 
 __all__ = [

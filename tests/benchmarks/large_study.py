@@ -19,7 +19,8 @@ from masrel.lab.ratings import ratings_from_logs, write_ratings
 from masrel.lab.recording import read_recording, write_recording
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule, write_schedules
+from masrel.lab.schedule.presentation import read_schedule
+from masrel.lab.schedule.sheets import write_schedules
 
 PER_RATER = 16  # four models, four times each
 

@@ -17,7 +17,7 @@ from masrel.lab.protocol.content import _coefficient_problems
 from masrel.lab.ratings import read_study_ratings, study_remarks
 from masrel.lab.ratings.study_data import _table_problem
 from masrel.lab.run._settings import check_backend, device_notes, torque_problems
-from masrel.lab.schedule import concealment_notes, schedule_problems
+from masrel.lab.schedule.sheets import concealment_notes, schedule_problems
 from masrel.lab.verification import verify_sessions
 from masrel.tables._tables import counted
 

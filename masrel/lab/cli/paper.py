@@ -13,9 +13,10 @@ from masrel.lab.cli._study_options import (
     several,
     warnings_as_notes,
 )
-from masrel.lab.paper import SheetDifference, compare_sheet, enter_sheet, write_sheets
+from masrel.lab.paper._entry import compare_sheet, enter_sheet
+from masrel.lab.paper._printing import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run._state import NO_DEVICE
+from masrel.lab.run._state import NO_DEVICE, SheetDifference
 
 
 @click.group("paper", cls=Commands)

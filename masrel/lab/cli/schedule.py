@@ -11,8 +11,7 @@ from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.report._material import FIGURES
 from masrel.lab.report._order_tables import count_tables, order_document, summary_table
-from masrel.lab.schedule import copy_for_site, site_of_copy
-from masrel.lab.schedule._secret import rater_sessions_at
+from masrel.lab.schedule._secret import copy_for_site, rater_sessions_at, site_of_copy
 from masrel.lab.schedule.sheets import _order_balance
 from masrel.lab.sealing import is_sealed
 from masrel.plots._drawn_values import Drawn

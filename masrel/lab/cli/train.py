@@ -32,7 +32,8 @@ from masrel.lab.report._training import (
     training_stamp,
     training_tables,
 )
-from masrel.lab.training import Lesson, SimulatedTrainee, read_training, train_rater
+from masrel.lab.training._lessons import Lesson, read_training
+from masrel.lab.training._trainer import SimulatedTrainee, train_rater
 
 _WIDTH = 88  # of notes below a table
 

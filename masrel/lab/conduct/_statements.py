@@ -28,8 +28,7 @@ from masrel.lab.protocol._values import (
     parsed_value,
 )
 from masrel.lab.protocol.read import _write_rater
-from masrel.lab.schedule import Presentation, Schedule
-from masrel.lab.schedule.presentation import _read_drawn
+from masrel.lab.schedule.presentation import Presentation, Schedule, _read_drawn
 from masrel.lab.schedule.sheets import _open_schedule
 
 NoteKind = Literal["note", "adverse-event", "deviation"]

@@ -33,10 +33,10 @@ from masrel.lab.protocol.content import (
     _protocol_content,
     _refuse_unknown_coefficients,
 )
-from masrel.lab.schedule import write_schedules
 from masrel.lab.schedule._orders import WITH_ROWS
 from masrel.lab.schedule._secret import site_of
 from masrel.lab.schedule.presentation import _read_drawn
+from masrel.lab.schedule.sheets import write_schedules
 from masrel.scales import published_scale
 
 _FORMAT = 1
@@ -291,7 +291,7 @@ def allot_schedules(
     ProtocolError
         If a line of the plan names no coefficient.
     ScheduleError
-        As :func:`masrel.lab.schedule.write_schedules` does; no row is allotted then.
+        As `write_schedules` does; no row is allotted then.
     SessionLogError
         If the log of the study's conduct is damaged.
     OSError

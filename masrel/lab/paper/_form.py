@@ -21,7 +21,7 @@ from masrel.lab._study_files import (
 from masrel.lab.protocol import Protocol, Question
 from masrel.lab.protocol._values import Answer, When, checked_answer, questions_of
 from masrel.lab.run._state import NO_GRADE
-from masrel.lab.schedule import Schedule
+from masrel.lab.schedule.presentation import Schedule
 
 FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 """Columns of every sheet that is typed in; those of questions follow."""

@@ -18,7 +18,7 @@ from masrel.lab.ratings.study_file import (
     _refuse,
 )
 from masrel.lab.run._state import FROM_PERSONS, SessionState, read_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 
 RECONSTRUCTED = "reconstructed"
 """Where answers come from that were never given: one set that fits what is printed."""

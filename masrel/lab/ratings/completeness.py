@@ -11,7 +11,7 @@ from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import Answer
 from masrel.lab.run._state import SessionState, read_session, sheet_differences
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

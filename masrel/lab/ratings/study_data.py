@@ -42,7 +42,7 @@ from masrel.lab.ratings.table import (
     ratings_from_rows,
 )
 from masrel.lab.run._state import FROM_PAPER, FROM_PERSONS, SessionState, read_session
-from masrel.lab.schedule import Schedule, check_schedule, read_schedule
+from masrel.lab.schedule.presentation import Schedule, check_schedule, read_schedule
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,8 +22,7 @@ from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import field_heading
 from masrel.lab.ratings import Correction, corrections_of, study_remarks
 from masrel.lab.report._material import FIGURES, Material
-from masrel.lab.schedule import Schedule
-from masrel.lab.schedule.presentation import _read_drawn
+from masrel.lab.schedule.presentation import Schedule, _read_drawn
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import INTERIM, Column, Table, Value, counted, table_of

@@ -11,7 +11,7 @@ from masrel.lab.hess import PresentationStatus
 from masrel.lab.protocol import PresentationRules, Protocol, Question, Questionnaire
 from masrel.lab.protocol._values import Answer, When, checked_answer, questions_of
 from masrel.lab.run._state import Felt
-from masrel.lab.schedule import Presentation
+from masrel.lab.schedule.presentation import Presentation
 
 MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any more
 

@@ -38,7 +38,7 @@ from masrel.lab.run._present import (
 from masrel.lab.run._settings import moves_hardware
 from masrel.lab.run._state import may_go_on
 from masrel.lab.run.console import _at_terminal
-from masrel.lab.schedule import Presentation
+from masrel.lab.schedule.presentation import Presentation
 
 ClockName = Literal["real", "simulated"]
 

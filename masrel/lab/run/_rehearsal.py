@@ -10,8 +10,8 @@ from pathlib import Path
 import msgspec
 
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
-from masrel.lab.schedule import Presentation, Schedule, draw_schedule
 from masrel.lab.schedule._secret import StudySecret, find_secret, new_secret
+from masrel.lab.schedule.presentation import Presentation, Schedule, draw_schedule
 
 _COMPLETE = b'{"event": "complete"'  # how the last line of a finished log begins
 

@@ -62,7 +62,7 @@ from masrel.lab.run._state import (
     SessionState,
     replay,
 )
-from masrel.lab.schedule import Presentation, Schedule
+from masrel.lab.schedule.presentation import Presentation, Schedule
 from masrel.lab.schedule.sheets import _drawn_schedule
 
 

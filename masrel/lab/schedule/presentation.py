@@ -321,13 +321,12 @@ def read_schedule(path: Path) -> Schedule:
     Parameters
     ----------
     path : Path
-        A file that :func:`masrel.lab.schedule.write_schedules` wrote.
+        A file that `write_schedules` wrote.
 
     Returns
     -------
     Schedule
-        The schedule; :func:`masrel.lab.schedule.check_schedule` compares it with a
-        protocol.
+        The schedule; `check_schedule` compares it with a protocol.
 
     Raises
     ------

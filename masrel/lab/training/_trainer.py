@@ -19,8 +19,8 @@ from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, StretchGrade
 from masrel.lab.run._presenter import ClockName, Presenter, check_same
 from masrel.lab.run.session import _check_device
-from masrel.lab.schedule import Presentation
 from masrel.lab.schedule._secret import Stream
+from masrel.lab.schedule.presentation import Presentation
 from masrel.lab.training._criterion import calibrate, training_criterion
 from masrel.lab.training._lessons import (
     FORMAT,

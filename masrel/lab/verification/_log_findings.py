@@ -26,8 +26,7 @@ from masrel.lab._study_files import (
 )
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import _FORMAT as _RECORDING_FORMAT
-from masrel.lab.schedule import Presentation
-from masrel.lab.schedule.presentation import _SEALED, _hidden
+from masrel.lab.schedule.presentation import _SEALED, Presentation, _hidden
 
 _Checked = TypeVar("_Checked")
 

@@ -18,7 +18,7 @@ from masrel.lab.run._rehearsal import (
     practice_presentations,
 )
 from masrel.lab.run._state import SessionState, read_session
-from masrel.lab.schedule import Presentation, Schedule, read_schedule
+from masrel.lab.schedule.presentation import Presentation, Schedule, read_schedule
 from masrel.lab.verification._log_findings import (
     Finding,
     broken,

@@ -37,9 +37,8 @@ from masrel.lab.conduct._study_log import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.protocol.study import _OPENED
-from masrel.lab.schedule import schedule_problems
 from masrel.lab.schedule.presentation import _read_drawn
-from masrel.lab.schedule.sheets import _of_another_secret
+from masrel.lab.schedule.sheets import _of_another_secret, schedule_problems
 from masrel.lab.verification._log_findings import (
     Finding,
     broken,

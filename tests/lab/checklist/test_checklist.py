@@ -22,7 +22,7 @@ from masrel.lab.conduct import record_standing
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.run._corrections import record_correction
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from tests.lab.run.conftest import new_study, small
 from tests.lab.script import ScriptGrades
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from masrel.lab.protocol import StudyPaths
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from tests.cli.process import Caller
 from tests.files import edit
 from tests.lab.protocol.documents import VALID, changed, write

@@ -14,13 +14,9 @@ from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import write_schedules
-from masrel.lab.training import (
-    SimulatedTrainee,
-    TrainingRecord,
-    read_training,
-    train_rater,
-)
+from masrel.lab.schedule.sheets import write_schedules
+from masrel.lab.training._lessons import TrainingRecord, read_training
+from masrel.lab.training._trainer import SimulatedTrainee, train_rater
 from tests.cli.process import Caller
 from tests.files import edit, small_study
 from tests.lab.run.kill_at import die_at_line

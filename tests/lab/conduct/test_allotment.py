@@ -10,13 +10,9 @@ import pytest
 from masrel.errors import ScheduleError, SessionLogError
 from masrel.lab.conduct import allot_schedules, record_standing
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.schedule import (
-    concealment_notes,
-    copy_for_site,
-    draw_schedule,
-    read_schedule,
-    schedule_problems,
-)
+from masrel.lab.schedule._secret import copy_for_site
+from masrel.lab.schedule.presentation import draw_schedule, read_schedule
+from masrel.lab.schedule.sheets import concealment_notes, schedule_problems
 from masrel.lab.verification import verify_sessions
 from tests.files import edit
 from tests.lab.schedule.studies import SECRET, protocol_of, with_secret

@@ -31,7 +31,7 @@ from masrel.lab.conduct import (
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.run._corrections import record_correction
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from tests.files import edit
 from tests.lab.script import ScriptGrades
 

@@ -23,7 +23,8 @@ from masrel.lab.report._conduct import study_conduct
 from masrel.lab.report._document import write_report
 from masrel.lab.run._corrections import record_correction
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule, write_schedules
+from masrel.lab.schedule.presentation import read_schedule
+from masrel.lab.schedule.sheets import write_schedules
 from tests.lab.run.conftest import PROTOCOL
 from tests.lab.schedule.studies import with_secret
 from tests.lab.script import ScriptGrades

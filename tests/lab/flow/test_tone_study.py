@@ -9,7 +9,7 @@ from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import PHASES, read_recording
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from tests.files import edit, table_of
 from tests.lab.flow.conftest import run
 

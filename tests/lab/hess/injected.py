@@ -33,7 +33,7 @@ from masrel.lab.recording import read_recording, write_recording
 from masrel.lab.run._settings import model_controller
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import write_schedules
+from masrel.lab.schedule.sheets import write_schedules
 
 from . import faults as f
 from .rig import ActingClock, missing

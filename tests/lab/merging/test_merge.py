@@ -18,12 +18,12 @@ from masrel.lab.conduct import (
 )
 from masrel.lab.conduct._calibrations import write_calibration
 from masrel.lab.merging import merge_studies
-from masrel.lab.paper import write_sheets
+from masrel.lab.paper._printing import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
-from masrel.lab.training import SimulatedTrainee, train_rater
+from masrel.lab.training._trainer import SimulatedTrainee, train_rater
 from masrel.lab.verification import anchors_of, verify_study
 from tests.files import contents, edit
 from tests.lab.cli.test_train import RULES
@@ -218,7 +218,7 @@ def refusal(sites: Sites, out: Path, kind: type[MasrelError]) -> str:
 def test_another_secret_is_refused(
     sites: Sites, new_study: NewStudy, tmp_path: Path
 ) -> None:
-    from masrel.lab.schedule import write_schedules
+    from masrel.lab.schedule.sheets import write_schedules
 
     east = StudyPaths(site(new_study, "east", "R5"))
     for file in (*east.schedules.glob("*.csv"), east.secret_file):

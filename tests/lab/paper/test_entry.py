@@ -20,7 +20,8 @@ from masrel.errors import (
 )
 from masrel.lab._event_log import read_log
 from masrel.lab.analysis import analyze
-from masrel.lab.paper import SheetDifference, compare_sheet, enter_sheet, write_sheets
+from masrel.lab.paper._entry import compare_sheet, enter_sheet
+from masrel.lab.paper._printing import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import (
     corrections_of,
@@ -29,7 +30,8 @@ from masrel.lab.ratings import (
     study_remarks,
 )
 from masrel.lab.run._corrections import record_answer, record_correction
-from masrel.lab.schedule import read_schedule
+from masrel.lab.run._state import SheetDifference
+from masrel.lab.schedule.presentation import read_schedule
 from masrel.lab.verification import verify_study
 from tests.lab.paper.conftest import QUESTIONS
 from tests.lab.run.test_session import console, run

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ScheduleError
-from masrel.lab.paper import write_sheets
+from masrel.lab.paper._printing import write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.schedule import read_schedule, write_schedules
+from masrel.lab.schedule.presentation import read_schedule
+from masrel.lab.schedule.sheets import write_schedules
 from tests.lab.paper.conftest import QUESTIONS
 from tests.lab.report.test_in_chromium import CHROMIUM, WORDS, printed
 

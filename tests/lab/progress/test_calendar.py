@@ -10,7 +10,8 @@ import pytest
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.lab._event_log import read_log
 from masrel.lab.conduct import allot_schedules, record_amendment
-from masrel.lab.paper import enter_sheet, write_sheets
+from masrel.lab.paper._entry import enter_sheet
+from masrel.lab.paper._printing import write_sheets
 from masrel.lab.progress import (
     next_step,
     rater_progress,

@@ -20,7 +20,8 @@ from masrel.lab.progress import (
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.run._corrections import record_correction
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule, write_schedules
+from masrel.lab.schedule.presentation import read_schedule
+from masrel.lab.schedule.sheets import write_schedules
 from tests.lab.script import ScriptGrades
 
 Small = tuple[StudyPaths, Protocol]

@@ -10,7 +10,7 @@ from masrel.lab._event_log import SessionLog
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import rating_matrix, ratings_from_logs, write_ratings
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from tests.lab.run.conftest import new_study, small
 from tests.lab.script import ScriptGrades
 

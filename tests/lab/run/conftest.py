@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.schedule import write_schedules
+from masrel.lab.schedule.sheets import write_schedules
 from tests.lab.schedule.studies import with_secret
 
 PROTOCOL = """

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from masrel.cli import main
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 
 NAMES = (("HM1", "ZEBRA"), ("HM3", "OKAPI"), ("D1", "TAPIR"))
 

@@ -24,7 +24,7 @@ from masrel.lab.ratings import (
 from masrel.lab.run._corrections import record_correction, record_skip
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from masrel.lab.verification import verify_study
 from tests.cli.process import Caller, Done
 from tests.lab.run.test_session import console, run

@@ -35,7 +35,7 @@ from masrel.lab.recording import read_recording
 from masrel.lab.run._grade_sources import GradeRequest, StretchGrade
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from masrel.lab.verification import verify_study
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.run.test_session import console, run

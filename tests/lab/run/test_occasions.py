@@ -27,7 +27,7 @@ from masrel.lab.run._grade_sources import GradeRequest
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.console import ConsoleGrades
 from masrel.lab.run.session import SessionSummary, run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from masrel.lab.verification import verify_study
 from tests.lab.run.test_command import typed
 from tests.lab.run.test_session import console

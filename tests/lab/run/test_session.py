@@ -33,7 +33,7 @@ from masrel.lab.run._grade_sources import GradeRequest, GradeSource
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.console import ConsoleGrades
 from masrel.lab.run.session import SessionSummary, run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 from tests.lab.script import ScriptGrades
 

@@ -13,11 +13,9 @@ import pytest
 
 from masrel.errors import ScheduleError
 from masrel.lab.protocol import StudyPaths
-from masrel.lab.schedule import (
-    Schedule,
+from masrel.lab.schedule.presentation import Schedule, draw_schedule, read_schedule
+from masrel.lab.schedule.sheets import (
     concealment_notes,
-    draw_schedule,
-    read_schedule,
     schedule_problems,
     write_schedules,
 )

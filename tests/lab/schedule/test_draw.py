@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from masrel.errors import ScheduleError
 from masrel.lab.protocol import read_protocol
-from masrel.lab.schedule import Schedule, check_schedule, draw_schedule
+from masrel.lab.schedule.presentation import Schedule, check_schedule, draw_schedule
 from tests.lab.schedule.studies import protocol_of, words_of
 
 PUBLISHED = Path(__file__).parents[3] / "studies" / "hess2012" / "protocol.toml"

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.schedule import (
+from masrel.lab.schedule.presentation import draw_schedule
+from masrel.lab.schedule.sheets import (
     concealment_notes,
-    draw_schedule,
     schedule_problems,
     write_schedules,
 )

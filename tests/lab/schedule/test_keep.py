@@ -14,12 +14,8 @@ from masrel.lab.protocol import (
     StudyPaths,
     presented_hash,
 )
-from masrel.lab.schedule import (
-    draw_schedule,
-    read_schedule,
-    schedule_problems,
-    write_schedules,
-)
+from masrel.lab.schedule.presentation import draw_schedule, read_schedule
+from masrel.lab.schedule.sheets import schedule_problems, write_schedules
 from tests.lab.schedule.studies import SECRET, protocol_of, with_secret
 
 

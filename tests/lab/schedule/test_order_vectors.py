@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from masrel.lab.schedule import draw_schedule
+from masrel.lab.schedule.presentation import draw_schedule
 from tests.lab.schedule.studies import SECRET, protocol_of, words_from
 
 PAGE = (Path(__file__).parents[3] / "docs/reference/orders.md").read_text("utf-8")

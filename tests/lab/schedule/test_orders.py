@@ -12,12 +12,8 @@ from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
 )
-from masrel.lab.schedule import (
-    check_schedule,
-    draw_schedule,
-    schedule_problems,
-    write_schedules,
-)
+from masrel.lab.schedule.presentation import check_schedule, draw_schedule
+from masrel.lab.schedule.sheets import schedule_problems, write_schedules
 from tests.lab.protocol.documents import VALID, changed, problems_of
 from tests.lab.schedule.studies import SECRET, protocol_of
 

@@ -7,7 +7,8 @@ import pytest
 
 from masrel.errors import ScheduleError
 from masrel.lab.protocol import StudyPaths
-from masrel.lab.schedule import draw_schedule, read_schedule, write_schedules
+from masrel.lab.schedule.presentation import draw_schedule, read_schedule
+from masrel.lab.schedule.sheets import write_schedules
 from tests.lab.schedule.studies import SECRET, protocol_of, with_secret
 
 PROTOCOL = protocol_of(models=("A", "B"))

@@ -22,7 +22,7 @@ from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.recording import read_recording
 from masrel.lab.run._grade_sources import GradeRequest
 from masrel.lab.run.session import run_session
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from tests.lab.script import ScriptGrades
 from tests.lab.serve.pages import (
     ACTIONS,

@@ -13,7 +13,7 @@ import masrel.lab.serve
 from masrel.errors import MasrelError, ParameterError
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.protocol.definition import Study
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule.presentation import read_schedule
 from masrel.scales import PUBLISHED_SCALES
 from tests.lab.serve.pages import (
     OCCASIONS,

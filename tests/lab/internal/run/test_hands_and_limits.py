@@ -45,7 +45,7 @@ from masrel.lab.run._settings import (
     moves_hardware,
 )
 from masrel.lab.run._simulated_raters import SimulatedGrades, intended_speeds
-from masrel.lab.schedule import Presentation
+from masrel.lab.schedule.presentation import Presentation
 
 # Key of [device] to field of DeviceLimits, and what one unit of the key is there
 FIELDS = {

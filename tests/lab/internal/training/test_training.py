@@ -10,16 +10,11 @@ import pytest
 from masrel.agreement import cohen_kappa
 from masrel.lab._event_log import Event
 from masrel.lab.protocol import copy_template, presented_hash, read_protocol
-from masrel.lab.training import (
-    Criterion,
-    Lesson,
-    calibrate,
-    confusion,
-)
-from masrel.lab.training._criterion import Calibration
-from masrel.lab.training._lessons import SETTINGS, record_of
+from masrel.lab.training._criterion import Calibration, Criterion, calibrate
+from masrel.lab.training._lessons import SETTINGS, Lesson, record_of
 from masrel.lab.training._trainees import (
     adaptive_weights,
+    confusion,
     draw_blocks,
     draw_training,
 )
