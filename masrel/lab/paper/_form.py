@@ -76,8 +76,12 @@ def form_of(protocol: Protocol, schedule: Schedule) -> Form:
     # a rater is asked about the study on the sheet of the last session
     sessions = [each.id for each in protocol.sessions if schedule.rater in each.raters]
     is_last = schedule.session == sessions[-1]
+    # The id is of blinded codes alone, so that it says nothing about the order of
+    # models; letter and hyphen keep spreadsheets from taking it for a number.
+    named = [schedule.study, schedule.rater, schedule.session, *codes]
+    digest = sha256_of(json.dumps(named).encode()).upper()
     return Form(
-        id=_id_of(schedule.study, schedule.rater, schedule.session, codes),
+        id=f"S{digest[:4]}-{digest[4:8]}",
         rater=schedule.rater,
         session=schedule.session,
         codes=codes,
@@ -98,14 +102,6 @@ def _columns_of(protocol: Protocol, when: When) -> tuple[QuestionColumn, ...]:
         )
         for questionnaire, question in questions_of(protocol, when)
     )
-
-
-def _id_of(study: str, rater: str, session: str, codes: Sequence[str]) -> str:
-    # Of blinded codes alone, so that it says nothing about the order of models; the
-    # letter and the hyphen keep spreadsheets from taking it for a number.
-    content = json.dumps([study, rater, session, *codes]).encode()
-    digest = sha256_of(content).upper()
-    return f"S{digest[:4]}-{digest[4:8]}"
 
 
 _SEPARATORS = (",", ";", "\t")

@@ -40,8 +40,10 @@ def _key_problems(
 ) -> Iterator[str]:
     for place, key in enumerate(key for key in raw if key not in fields):
         # what was meant takes long to find, and helps with the first few
-        known = fields if place < _MAX_HINTS else {}
-        yield _unknown(f"{prefix}{key}", key, known)
+        options = list(fields) if place < _MAX_HINTS else []
+        hint = closest(key, options)
+        known = "" if hint or not options else f" ({', '.join(options)})"
+        yield f"{prefix}{key}: needed a known key{known}, got {got(key)}{hint}"
     for key, (annotation, is_required) in fields.items():
         where = f"{prefix}{key}"
         if key in raw:
@@ -107,12 +109,6 @@ def _leaf_problems(value: object, annotation: object, where: str) -> Iterator[st
         hint = closest(value, map(str, options))
         needs = "a table" if _table_of(annotation) else _form(annotation, where)
         yield f"{where}: needed {needs}, got {got(value)}{hint}"
-
-
-def _unknown(where: str, key: str, fields: Iterable[str]) -> str:
-    hint = closest(key, fields)
-    known = "" if hint or not fields else f" ({', '.join(fields)})"
-    return f"{where}: needed a known key{known}, got {got(key)}{hint}"
 
 
 def closest(value: object, options: Iterable[str]) -> str:

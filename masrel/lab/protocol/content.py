@@ -369,8 +369,15 @@ def _has_ids(value: Any) -> bool:
 def _canonical(content: object, ignored: tuple[str, ...] = ()) -> bytes:
     # ignored: keys of models that do not enter
     plain: dict[str, Any] = msgspec.to_builtins(content)
+    shared = {key: plain["elbow"][key] for key in ("post_catch", *_LATER["elbow"])}
     for model in plain["models"]:
-        _drop_repeated(model, plain["elbow"])
+        # without what it repeats of the shared constants, or of its kind
+        model["constants"] = {
+            key: value
+            for key, value in model["constants"].items()
+            if value is not None and value != shared.get(key)
+        }
+        model["parameters"] = without_defaults(model["kind"], model["parameters"])
         for key in ignored:
             model.pop(key, None)
     if "report" in plain and plain["report"]["sections"] is None:
@@ -390,17 +397,6 @@ def _drop(plain: dict[str, Any], defaults: dict[str, Any]) -> None:
             _drop(value, default)  # a study is perhaps its id alone
         if key in plain and value in (default, {}):
             del plain[key]
-
-
-def _drop_repeated(model: dict[str, Any], elbow: dict[str, Any]) -> None:
-    # takes out of a model what it repeats of the shared constants, or of its kind
-    shared = {key: elbow[key] for key in ("post_catch", *_LATER["elbow"])}
-    model["constants"] = {
-        key: value
-        for key, value in model["constants"].items()
-        if value is not None and value != shared.get(key)
-    }
-    model["parameters"] = without_defaults(model["kind"], model["parameters"])
 
 
 # Numbers of an estimate that a gate can be about

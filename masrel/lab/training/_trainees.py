@@ -62,7 +62,9 @@ def confusion(
     """
     if skill == "pair":
         table = np.eye(n_grades)
-        low, high = _middle(intended)
+        # of two neighbours in the middle of the intended grades
+        codes = sorted(set(intended))
+        low, high = codes[(len(codes) - 1) // 2 :][:2]
         table[low, [low, high]] = table[high, [high, low]] = 1.0 - amount, amount
     else:
         table = _noisy(amount, _SHIFT if skill == "shift" else 0.0, n_grades)
@@ -72,13 +74,6 @@ def confusion(
         table *= np.isin(np.arange(n_grades), intended)
         table /= table.sum(axis=1, keepdims=True)
     return table
-
-
-def _middle(intended: Sequence[int]) -> tuple[int, int]:
-    # two neighbours among the intended grades
-    codes = sorted(set(intended))
-    middle = (len(codes) - 1) // 2
-    return codes[middle], codes[middle + 1]
 
 
 def _noisy(sd: float, shift: float, n_grades: int) -> Floats:
