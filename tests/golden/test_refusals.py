@@ -34,8 +34,10 @@ STATISTICS = (
     "plots",
 )
 LABORATORY = (
-    *("protocol", "schedule", "run", "recording", "elbow", "elbow.tone"),
-    *("elbow.identification", "hess", "hess.puck", "hess.moteus", "ratings"),
+    *("protocol", "schedule.presentation", "schedule._secret", "_event_log"),
+    *("schedule.sheets", "run._corrections", "run._settings", "recording"),
+    *("elbow", "elbow.tone", "elbow.identification"),
+    *("hess", "hess.puck", "hess.moteus", "ratings"),
 )
 HOMES = [
     *(f"masrel.{name}" for name in STATISTICS),
@@ -48,7 +50,7 @@ class Names(dict[str, Any]):
 
     def __missing__(self, name: str) -> Any:
         for home in map(importlib.import_module, HOMES):
-            if name in getattr(home, "__all__", ()):
+            if name in getattr(home, "__all__", vars(home)):
                 return getattr(home, name)
         raise KeyError(name)
 

@@ -23,6 +23,8 @@ from masrel.lab.run._grade_sources import (
 from masrel.lab.run._state import FROM_PAPER
 from masrel.scales import Scale, published_scale
 
+__all__ = ["ConsoleGrades", "PaperGrades"]
+
 _CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
 
 _REMARKS = {

@@ -65,6 +65,8 @@ from masrel.lab.run._state import (
 from masrel.lab.schedule.presentation import Presentation, Schedule
 from masrel.lab.schedule.sheets import _drawn_schedule
 
+__all__ = ["SessionSummary", "run_session"]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionSummary:

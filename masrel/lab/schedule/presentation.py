@@ -26,6 +26,14 @@ from masrel.lab.protocol.study import _OPENED
 from masrel.lab.schedule._orders import WITH_ROWS, draw_order
 from masrel.lab.schedule._secret import Stream, StudySecret, site_of
 
+__all__ = [
+    "Presentation",
+    "Schedule",
+    "check_schedule",
+    "draw_schedule",
+    "read_schedule",
+]
+
 # No letter that reads as a digit (I, O, Q, S, Z), that makes a number of the code
 # (E), or that says left or right (L, R).
 _CODE_LETTERS = "ABCDFGHJKMNPTUVWXY"

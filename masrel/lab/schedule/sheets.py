@@ -43,6 +43,8 @@ from masrel.lab.schedule.presentation import (
     read_schedule,
 )
 
+__all__ = ["concealment_notes", "schedule_problems", "write_schedules"]
+
 
 def _drawn_schedule(
     study: StudyPaths, protocol: Protocol, rater: str, session: str
