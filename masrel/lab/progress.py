@@ -1,7 +1,7 @@
 """How far a study is: every session, every rater, and what to do next.
 
 In: a protocol, its schedules and logs. Out: where each session stands, what became of
-each rater, and one next step.
+each rater, and one next step. A sealed study is opened once its sessions are over.
 """
 
 import shlex
@@ -13,7 +13,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from masrel.errors import MasrelError, SessionLogError
+from masrel._files import write_files
+from masrel._input import listed
+from masrel.errors import MasrelError, ParameterError, SessionLogError
 from masrel.lab._event_log import Event, events_before_torn, utc_now
 from masrel.lab._study_files import MANIFEST, table_csv
 from masrel.lab.conduct import (
@@ -24,6 +26,12 @@ from masrel.lab.conduct import (
     read_conduct,
 )
 from masrel.lab.conduct._plan_versions import plan_versions
+from masrel.lab.conduct._study_log import (
+    append_event,
+    events_of_logs,
+    recover_conduct,
+    stated,
+)
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
 from masrel.lab.run._days import Due, due_of, held_on
@@ -35,7 +43,8 @@ from masrel.lab.run._state import (
     replay,
 )
 from masrel.lab.schedule._secret import find_secret, rater_sessions_at, site_of_copy
-from masrel.lab.schedule.presentation import _read_drawn
+from masrel.lab.schedule.presentation import _read_drawn, _schedule_text
+from masrel.lab.schedule.sheets import _open_schedule
 
 __all__ = [
     "NextStep",
@@ -47,6 +56,7 @@ __all__ = [
     "raters_csv",
     "session_progress",
     "study_status",
+    "unseal_study",
 ]
 
 # How far a session came
@@ -600,3 +610,76 @@ def study_status(study: StudyPaths, protocol: Protocol) -> dict[str, Any]:
         "problem": problem,
         "next": asdict(next_step(study, sessions, raters, changes)),
     }
+
+
+def unseal_study(
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    who: str,
+    why: str,
+    now: Callable[[], datetime] = utc_now,
+) -> int:
+    """Write the models of sealed schedules beside them, once every session is over.
+
+    Where one account holds the secret, sealing stops curiosity, not intent.
+    Who asked for it and why is on disk before. A call that was cut off is finished by
+    the same call, and leaves no second event.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is, with its secret. The copy of a site is opened once the
+        sessions of the site are over.
+    protocol : Protocol
+        The study's protocol.
+    who, why : str
+        Who is to know, and for what reason.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Returns
+    -------
+    int
+        How many sealed schedules are open now; 0 of a study that has none.
+
+    Raises
+    ------
+    ParameterError
+        If a session is neither complete nor its rater withdrawn or excluded, or `who`
+        or `why` is blank.
+    ScheduleError
+        If a schedule is damaged, or the secret is not that of the schedules.
+    SessionLogError
+        If a log is damaged.
+    OSError
+        If a file cannot be written.
+    """
+    reasons = stated(who=who, why=why)
+    drawn = [each for _, each in _read_drawn(study, protocol.rater_sessions)]
+    if not (sealed := [each for each in drawn if each.sealed]):
+        return 0
+    recover_conduct(study)
+    sessions = session_progress(study, protocol)
+    going_on = open_sessions(sessions, rater_progress(study, protocol, sessions))
+    if going_on:
+        names = listed(f"{each.rater} in session {each.session}" for each in going_on)
+        raise ParameterError(
+            "study: needed every session complete or its rater withdrawn, "
+            f"{names} {'is' if len(going_on) == 1 else 'are'} not"
+        )
+    opened = [_open_schedule(study, protocol, each) for each in sealed]
+    texts = {
+        study.opened_file(each.rater, each.session): _schedule_text(each)
+        for each in opened
+    }
+    request = {"rater": None, "session": None, "code": None, **reasons}
+    # what is drawn later is opened by another event
+    is_recorded = False
+    for _, event in events_of_logs(study):
+        is_asked = event.kind == "unblinded" and dict(event.fields) == request
+        is_recorded = event.kind != "drawn" and (is_recorded or is_asked)
+    if not is_recorded:
+        append_event(study, protocol, "unblinded", request, now=now)
+    write_files(texts, within=study.root)
+    return len(sealed)

@@ -28,6 +28,7 @@ from masrel.lab.conduct import (
     registration,
 )
 from masrel.lab.conduct._statements import NoteKind, Standing
+from masrel.lab.progress import unseal_study
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol.study import _OPENED
 from masrel.lab.run._corrections import (
@@ -36,7 +37,6 @@ from masrel.lab.run._corrections import (
     record_day,
     record_skip,
 )
-from masrel.lab.sealing import unseal_study
 
 
 @click.group("record", cls=Commands)

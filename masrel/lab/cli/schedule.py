@@ -12,8 +12,8 @@ from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.report._material import FIGURES
 from masrel.lab.report._order_tables import count_tables, order_document, summary_table
 from masrel.lab.schedule._secret import copy_for_site, rater_sessions_at, site_of_copy
+from masrel.lab.schedule.presentation import is_sealed
 from masrel.lab.schedule.sheets import _order_balance
-from masrel.lab.sealing import is_sealed
 from masrel.plots._drawn_values import Drawn
 
 

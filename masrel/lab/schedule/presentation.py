@@ -31,6 +31,7 @@ __all__ = [
     "Schedule",
     "check_schedule",
     "draw_schedule",
+    "is_sealed",
     "read_schedule",
 ]
 
@@ -408,6 +409,25 @@ def _read_drawn(
             except ScheduleError:  # which `schedule_problems` has
                 if not skips_damaged:
                     raise
+
+
+def is_sealed(study: StudyPaths, protocol: Protocol) -> bool:
+    """Say whether any drawn schedule of a study is sealed still.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol; what it says of sealing is for schedules to come.
+
+    Returns
+    -------
+    bool
+        Whether there is one; one that is damaged does not count.
+    """
+    drawn = _read_drawn(study, protocol.rater_sessions, skips_damaged=True)
+    return any(schedule.is_closed for _, schedule in drawn)
 
 
 def _format_problem(lines: Sequence[str]) -> str | None:

@@ -35,7 +35,7 @@ from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.run._corrections import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
-from masrel.lab.sealing import is_sealed
+from masrel.lab.schedule.presentation import is_sealed
 from masrel.lab.serve._access import Access, qr_svg
 from masrel.lab.serve._live import SampleTail
 from masrel.lab.serve._manager import SessionManager

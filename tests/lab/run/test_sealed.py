@@ -20,12 +20,12 @@ from masrel.lab.conduct import (
     record_unblinding,
 )
 from masrel.lab.merging import merge_studies
+from masrel.lab.progress import unseal_study
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs, read_study_data
 from masrel.lab.run.session import run_session
 from masrel.lab.schedule._secret import copy_for_site
-from masrel.lab.schedule.presentation import read_schedule
-from masrel.lab.sealing import is_sealed, unseal_study
+from masrel.lab.schedule.presentation import is_sealed, read_schedule
 from masrel.lab.verification import verify_study
 from tests.files import edit, small_study
 from tests.lab.flow.conftest import run as masrel
