@@ -568,7 +568,7 @@ def _metadata(dataset: _Dataset, files: list[dict[str, object]]) -> dict[str, ob
     made = [part for part in parts if str(part["@id"]).startswith(of_report)]
     root: dict[str, object] = {
         "@id": "./",
-        "@type": "_Dataset",
+        "@type": "Dataset",
         "name": dataset.protocol.study.title,
         "description": dataset.description,
         "license": "Not stated: to be added by the authors.",
