@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab import analysis, conduct, paper, ratings, report, run
+from masrel.lab import SimulatedGrades, analysis, conduct, ratings, run_session
+from masrel.lab.paper._entry import enter_sheet
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.report import _document, _material, _paragraphs
+from masrel.lab.report import _conduct, _document, _material, _paragraphs
 from masrel.tables._tables import tag_of
 from tests.lab.paper.test_entry import filled, typed
 from tests.lab.run.conftest import PROTOCOL
@@ -54,13 +55,13 @@ class Case:
 
 def by_a_person(study: Study) -> None:
     rater = "R2" if study[0].log_file("R1", "test").exists() else "R1"
-    run.run_session(
+    run_session(
         *study, rater, "test", grades=console("\n1\n" * 5)[0], clock="simulated"
     )
 
 
 def on_paper(study: Study) -> None:
-    paper.enter_sheet(
+    enter_sheet(
         *(*study, typed(study, filled(study, "1", "2", "3")), "R1", "test"), who="JL"
     )
 
@@ -198,8 +199,8 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
         protocol = read_protocol(paths.protocol)
         conduct.allot_schedules(paths, protocol)
         for pair in pairs:
-            grades = run.SimulatedGrades(protocol)
-            run.run_session(paths, protocol, *pair, grades=grades, clock="simulated")
+            grades = SimulatedGrades(protocol)
+            run_session(paths, protocol, *pair, grades=grades, clock="simulated")
     return folder
 
 
@@ -214,7 +215,7 @@ def test_words_follow_the_record(what: str, studies: Path, tmp_path: Path) -> No
     file = came if isinstance(came, Path) else None
     protocol = read_protocol(paths.protocol)
     data = ratings.read_study_data(paths, protocol, file=file)
-    happened = report.study_conduct(paths, protocol, file=file, include=case.include)
+    happened = _conduct.study_conduct(paths, protocol, file=file, include=case.include)
     of_study = (protocol, data.ratings, analysis.analyze(protocol, data.ratings))
     text = shown(_material.gather(*of_study, conduct=happened))
     assert [said for said in case.says if said not in text] == []
