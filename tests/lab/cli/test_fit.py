@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -111,11 +112,11 @@ def test_figures_are_drawn(masrel: Caller, files: list[Path], tmp_path: Path) ->
 
 def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
     path = put(backdriven(1), tmp_path)
-    done = masrel(
-        "joint", "friction", path, "--figures", tmp_path / "out", "--json", "-"
-    )
+    more = ("--figures", tmp_path / "out", "--json", tmp_path / "out/friction.json")
+    done = masrel("joint", "friction", path, *more)
     assert done.code == 0, done.err
-    document = json.loads(done.out)
+    assert re.findall(r"^[IBβ](?= )", done.out, re.M) == ["I", "B", "β"]
+    document = json.loads((tmp_path / "out/friction.json").read_text("utf-8"))
     values = {e["key"]: e["value"] for e in document["estimates"]}
     assert values["viscous_nms_rad"] == pytest.approx(0.168, rel=0.02)
     assert (tmp_path / "out" / "fit_friction.png").stat().st_size > 10_000

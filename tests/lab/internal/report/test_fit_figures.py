@@ -5,12 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.lab.elbow import STANDARD_MODELS, fit
 from masrel.lab.elbow.identification import ElbowFit
 from masrel.lab.report import _fit_figures as figures
-from masrel.lab.report._fits import fit_figures, fit_table
+from masrel.lab.report._fits import fit_figures
 from tests.lab.elbow.identification.synthesis import Scatter, study
-from tests.lab.elbow.identification.test_friction import backdriven
 
 
 def svg_of(found: ElbowFit, view: str) -> str:
@@ -87,9 +86,3 @@ def test_residuals_are_those_of_every_sample(found: ElbowFit) -> None:
     together = np.concatenate([slow[1], fast[1]])
     assert np.abs(together).mean() < 0.1  # N·m: the noise that was put in
     assert fast[0].min() < 0.0 < fast[0].max()  # around the catch
-
-
-def test_friction_has_its_figure_and_table() -> None:
-    found = fit_friction([backdriven(1)])
-    assert list(fit_figures(found)) == ["fit_friction"]
-    assert [row[0] for row in fit_table(found).rows] == ["I", "B", "β"]
