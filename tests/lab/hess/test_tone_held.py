@@ -252,7 +252,7 @@ def test_a_kind_begins_from_nothing_and_gives_up_softly(kind: str) -> None:
         returns=True,
         rest=1.0,
     )
-    presented = present(KINDS[kind], hand=hand, stretches=StretchRules(n=1))
+    presented = present(KINDS[kind], hand=hand, stretches=StretchRules(n=3))
     torque = presented.recording.columns["command_torque_nm"]
     assert torque[0] == 0.0
     assert abs(np.diff(torque[:101])).max() <= 0.25
