@@ -61,7 +61,7 @@ _ICC_ALIASES: dict[IccForm, tuple[str, ...]] = {
     "ICC(A,k)": ("ICC(2,k)", "ICC2k"),
 }
 
-_ROUNDING = 1e-13  # share of the sum of all squares that is none
+_ROUNDING = 1e-13  # share of the sum of all squares, or their variance, that is none
 
 _ALL_ALIKE = "0/0: there are no differences between items or within them"
 

@@ -27,7 +27,7 @@ from masrel.agreement._engine import (
     undefined,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement.icc import _Anova, _too_few
+from masrel.agreement.icc import _ROUNDING, _Anova, _too_few
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval
 
@@ -42,7 +42,6 @@ _CHANGE = 1.96 * math.sqrt(2.0)
 
 _FEW = 3  # items from which on Lin's concordance has an error
 
-_ROUNDING = 1e-13  # share of the variance of all ratings that is none
 
 _NODES, _FARTHEST = 96, 8.5
 """Of Gauss and Legendre's rule over what the mean can be: nodes, and standard errors

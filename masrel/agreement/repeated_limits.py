@@ -22,12 +22,8 @@ from masrel.agreement._engine import (
     student_t,
     undefined,
 )
-from masrel.agreement.measurement import (
-    _CHANGE,
-    _ROUNDING,
-    _error,
-    _variance_ends,
-)
+from masrel.agreement.icc import _ROUNDING
+from masrel.agreement.measurement import _CHANGE, _error, _variance_ends
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval, _Caution
 

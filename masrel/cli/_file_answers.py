@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import click
 
 from masrel._input import refuse, split_names
-from masrel.analysis._file_estimates import USUAL, Answer, Questions
+from masrel.analysis._file_estimates import USUAL, Questions
 from masrel.cli._options import (
     GroupedHelp,
     OutputOptions,
@@ -246,7 +246,7 @@ def _show_answers(
     from masrel.analysis._file_questions import answers
     from masrel.pages._answer_page import answer_page
     from masrel.pages._pictures import main_picture
-    from masrel.tables._answer_tables import agreement_sentences
+    from masrel.tables._answer_tables import agreement_sentences, answer_documents
     from masrel.tables._first_screen import (
         first_screen,
         judge_sentences,
@@ -283,7 +283,9 @@ def _show_answers(
     write_output(
         output,
         document=lambda: _record(
-            *(others, reading, questions, answered), [*warned, *notes]
+            *(others, reading, questions),
+            {of.name: answer_documents(of, questions.words) for of in answered},
+            [*warned, *notes],
         ),
         text=sentences if is_sentence else lambda: table,
         figure=lambda: main_picture(answered, questions),
@@ -315,15 +317,13 @@ def _record(
     ratings: "RatingsFile",
     reading: Reading,
     questions: Questions,
-    answers: Sequence[Answer],
+    documents: dict[str, Any],
     notes: list[str],
 ) -> dict[str, object]:
     """Return everything for JSON."""
     from masrel import __version__
-    from masrel.tables._answer_tables import answer_documents
 
     read, scale = dict(ratings.read), ratings.scale
-    documents = {of.name: answer_documents(of, questions.words) for of in answers}
     return {
         "masrel": __version__,
         "file": read.pop("file"),

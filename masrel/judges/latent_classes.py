@@ -16,6 +16,7 @@ from scipy.optimize import linear_sum_assignment
 
 from masrel._input import check_option, listed, refuse, shown, warn_caller
 from masrel.agreement import Label
+from masrel.agreement._codes import read_only
 from masrel.agreement._engine import (
     Floats,
     Integers,
@@ -377,10 +378,10 @@ def _result(
         categories=votes.categories,
         raters=votes.raters,
         items=votes.items,
-        shares=_read_only(shares),
-        confusion=_read_only(confusion),
-        accuracy=_read_only(correct @ shares),
-        posterior=_read_only(posterior),
+        shares=read_only(shares),
+        confusion=read_only(confusion),
+        accuracy=read_only(correct @ shares),
+        posterior=read_only(posterior),
         log_likelihood=float(fits.log_likelihood[0]),
         start=start,
         is_converged=fits.move <= _SETTLED,
@@ -408,11 +409,6 @@ def _doubts(votes: _Votes, posterior: Floats, has_none: Any) -> tuple[str, ...]:
             else []
         ),
     )
-
-
-def _read_only(values: Floats) -> Floats:
-    values.setflags(write=False)
-    return values
 
 
 # -- intervals -------------------------------------------------------------------------

@@ -1,10 +1,9 @@
 """Values that figures show; they load no drawing library."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from masrel.estimates import Interval
+from masrel.estimates import Interval
 
 Form = Literal["png", "svg", "pdf", "inline"]
 """What a figure's file can be; inline is the SVG of a page, in the page's colours."""
@@ -30,7 +29,7 @@ class ForestRow:
     detail: str = ""
     value: float | None = None  # None where there is no finite one
     # None where its ends are not finite; drawn with its distribution if it has one
-    interval: "Interval | None" = None
+    interval: Interval | None = None
     text: str  # the numbers, or why there are none, as shown at the right
     has_zero: bool = True  # whether 0 is what chance gives, so that it is marked
     group: str = ""  # heading above the first row of those that share it

@@ -3,12 +3,13 @@
 import itertools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from masrel.intervals import LatentTrait, Quantity
 from masrel.plots._style import (
     BLACK,
     BLUE,
@@ -21,9 +22,6 @@ from masrel.plots._style import (
 )
 from masrel.tables._tables import percent
 
-if TYPE_CHECKING:
-    from masrel.intervals import LatentTrait, Quantity
-
 _ROW = 0.22  # inches a row
 _MOST = 14.0  # inches of all rows
 _LETTER_WIDTH = 0.055  # share of the axis that a grade's name needs for a letter
@@ -34,7 +32,7 @@ _THRESHOLD: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASH
 
 
 def latent(
-    trait: "LatentTrait", grades: Sequence[str] = (), *, ax: Axes | None = None
+    trait: LatentTrait, grades: Sequence[str] = (), *, ax: Axes | None = None
 ) -> Axes:
     """Draw items, thresholds between grades and raters on the latent scale.
 
@@ -59,7 +57,7 @@ def latent(
     return shown(latent_picture(trait, grades), ax)
 
 
-def latent_picture(scale: "LatentTrait", grades: Sequence[str]) -> Picture:
+def latent_picture(scale: LatentTrait, grades: Sequence[str]) -> Picture:
     """Return severities, thresholds and biases on one scale, with noises of raters."""
     # grades: those of the scale
     noises = [noise.value for noise in scale.noises]
@@ -114,7 +112,7 @@ def latent_picture(scale: "LatentTrait", grades: Sequence[str]) -> Picture:
     return Picture(7.2, row * n_rows + 1.3, draw)
 
 
-def _reach(scale: "LatentTrait", noises: Sequence[float]) -> tuple[float, float]:
+def _reach(scale: LatentTrait, noises: Sequence[float]) -> tuple[float, float]:
     # from end to end of what the ratings bear on: ends of unused grades are cut
     known = [(row.interval, 0.0) for row in scale.items]
     known += [(row.interval, n) for row, n in zip(scale.raters, noises, strict=True)]
@@ -128,7 +126,7 @@ def _reach(scale: "LatentTrait", noises: Sequence[float]) -> tuple[float, float]
 def _draw_rows(
     axes: Axes,
     start: int,
-    rows: "Sequence[Quantity]",
+    rows: Sequence[Quantity],
     colour: str,
     noises: Sequence[float],
 ) -> None:

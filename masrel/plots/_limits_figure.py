@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,6 +16,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
+from masrel.agreement import LimitsOfAgreement, LimitsWithMean, RepeatedLimits
+from masrel.estimates import Interval
 from masrel.plots._style import (
     BLACK,
     BLUE,
@@ -30,13 +32,9 @@ from masrel.plots._style import (
 )
 from masrel.tables._tables import counted, fixed_or_significant, percent
 
-if TYPE_CHECKING:
-    from masrel.agreement import LimitsOfAgreement, LimitsWithMean, RepeatedLimits
-    from masrel.estimates import Interval
-
-    Limits = LimitsOfAgreement | RepeatedLimits | LimitsWithMean
-    # what a part is called, its raters, and their limits
-    Panel = tuple[str, tuple[Sequence[str], Limits]]
+Limits = LimitsOfAgreement | RepeatedLimits | LimitsWithMean
+# what a part is called, its raters, and their limits
+Panel = tuple[str, tuple[Sequence[str], Limits]]
 
 _MAX_DOTS = 2000
 _MAX_IN_A_LINE = 24  # letters of both raters
@@ -55,7 +53,7 @@ _NAMES = {
 
 
 def bland_altman(
-    limits: "Limits",
+    limits: Limits,
     *,
     raters: Sequence[str] = ("first", "second"),
     unit: str = "",
@@ -93,7 +91,7 @@ def bland_altman(
     return shown(picture, ax)
 
 
-def limits_pictures(panels: "Sequence[Panel]", unit: str) -> list[tuple[str, Picture]]:
+def limits_pictures(panels: Sequence[Panel], unit: str) -> list[tuple[str, Picture]]:
     """Return the differences of every part, on one scale, each as a picture."""
     points = (np.column_stack([p.averages, p.differences]) for _, (_, p) in panels)
     # where items are, (n, 2), and how many at each place
@@ -113,7 +111,7 @@ def limits_pictures(panels: "Sequence[Panel]", unit: str) -> list[tuple[str, Pic
 _BESIDE = {"upper limit": "bottom", "lower limit": "top"}
 
 
-def _same(panel: "Limits") -> float:
+def _same(panel: Limits) -> float:
     # where two that are the same lie: no difference, or a ratio of 1
     return float(getattr(panel, "kind", None) == "ratio")
 
@@ -138,7 +136,7 @@ def _lines(panel: Any) -> "tuple[list[float], list[list[tuple[str, float, Interv
     return places, [_lines_at(panel.at(place)) for place in places]
 
 
-def _ends(panel: "Limits") -> list[float]:
+def _ends(panel: Limits) -> list[float]:
     # what the axis of the differences is to show
     return [
         *(_same(panel), *panel.differences.tolist()),
@@ -154,7 +152,7 @@ def _ends(panel: "Limits") -> list[float]:
 
 def _draw(
     raters: Sequence[str],
-    panel: "Limits",
+    panel: Limits,
     dots: tuple[NDArray[np.float64], NDArray[np.intp]],
     most: int,
     unit: str,
@@ -196,7 +194,7 @@ def _draw(
     legend_below(axes, marks, ncols=3)
 
 
-def _draw_hexagons(axes: Axes, panel: "Limits") -> None:
+def _draw_hexagons(axes: Axes, panel: Limits) -> None:
     drawn = axes.hexbin(
         panel.averages,
         panel.differences,
@@ -215,7 +213,7 @@ def _draw_hexagons(axes: Axes, panel: "Limits") -> None:
     bar.minorformatter = LogFormatter()
 
 
-def _draw_lines(axes: Axes, panel: "Limits") -> None:
+def _draw_lines(axes: Axes, panel: Limits) -> None:
     axes.axhline(_same(panel), color=GREY, linewidth=0.7, linestyle=DASHES, zorder=1.0)
     places, lines = _lines(panel)
     # level ones from one side of the axes to the other

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from unicodedata import east_asian_width
 
 import numpy as np
@@ -21,6 +21,7 @@ from masrel.agreement import (
     VarianceComponents,
     variance_components,
 )
+from masrel.intervals import Diagnosis
 from masrel.plots._style import (
     BLACK,
     BLUE,
@@ -38,9 +39,6 @@ from masrel.plots._style import (
     shown,
 )
 from masrel.tables._tables import number, percent
-
-if TYPE_CHECKING:
-    from masrel.intervals import Diagnosis
 
 _PARTS = {"items": BLUE, "raters": ORANGE, "residual": "#999999"}
 
@@ -224,7 +222,7 @@ _LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.8}
 
 
 def pairs(
-    diagnosis: "Diagnosis", *, title: str | None = None, ax: Axes | None = None
+    diagnosis: Diagnosis, *, title: str | None = None, ax: Axes | None = None
 ) -> Axes:
     """Draw the agreement of every two raters, and how it changes without each rater.
 
@@ -259,7 +257,7 @@ def pairs(
     return shown(pairs_picture(diagnosis, name), ax)
 
 
-def pairs_picture(result: "Diagnosis", title: str) -> Picture:
+def pairs_picture(result: Diagnosis, title: str) -> Picture:
     """Return a heatmap of pairs, with the change without each rater beside it."""
     n = len(result.raters)
     cell = next(inches for most, inches in _CELLS if n <= most)
@@ -294,7 +292,7 @@ def pairs_pictures(
     return [(name, pairs_picture(result, title)) for name, result in parts]
 
 
-def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> Floats:
+def _pairs(result: Diagnosis, order: NDArray[np.intp]) -> Floats:
     # by rater, and then with the reference if there is one
     values = result.pair_values[np.ix_(order, order)]
     if result.reference is None:
@@ -319,7 +317,7 @@ def _short(value: float) -> str:
 
 
 def _influence(
-    axes: Axes, result: "Diagnosis", order: NDArray[np.intp], cell: float
+    axes: Axes, result: Diagnosis, order: NDArray[np.intp], cell: float
 ) -> None:
     places = np.arange(len(order))
     axes.hlines(places, result.change_low[order], result.change_high[order], **_LINE)

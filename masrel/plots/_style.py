@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import matplotlib as mpl
 from matplotlib import font_manager
@@ -39,9 +39,6 @@ from matplotlib.transforms import (
 
 from masrel.errors import MissingLettersWarning
 from masrel.plots._drawn_values import Form
-
-if TYPE_CHECKING:
-    from matplotlib.typing import RcKeyType
 
 BLACK = "#000000"
 GREY = "#6B6B6B"
@@ -74,7 +71,7 @@ SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 _POINTS = 72  # to the inch
 _FONT = "DejaVu Sans"  # ships with matplotlib: the same everywhere
 
-STYLE: "dict[RcKeyType, object]" = {
+STYLE: dict[Any, object] = {
     "font.family": _FONT,
     "font.size": 9,
     "axes.labelsize": 9,

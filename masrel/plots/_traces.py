@@ -43,18 +43,18 @@ _PHASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("post-catch", {"color": BLUE, "linewidth": 1.0, "linestyle": (0, (4, 1.2))}),
 )
 
-_Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 
 class Stretch(Protocol):
     """Columns of one stretch, as `masrel.lab.elbow.trace` returns them."""
 
     @property
-    def time(self) -> _Floats: ...  # s
+    def time(self) -> Floats: ...  # s
     @property
-    def angle(self) -> _Floats: ...  # rad
+    def angle(self) -> Floats: ...  # rad
     @property
-    def torque(self) -> _Floats: ...  # N·m
+    def torque(self) -> Floats: ...  # N·m
     @property
     def phase(self) -> NDArray[np.int8]: ...  # code: pre-catch, catch, post-catch
 
@@ -155,7 +155,7 @@ def draw_traces(
             axes.plot(*dots, "o", color=look["color"], markersize=2.4)
 
 
-def _points(stretch: Stretch, quantity: Against) -> _Floats:
+def _points(stretch: Stretch, quantity: Against) -> Floats:
     # (2, n_samples): s or deg, and N·m or deg
     angle, is_over_angle = np.degrees(stretch.angle), quantity == "torque over angle"
     values = angle if quantity == "angle" else stretch.torque

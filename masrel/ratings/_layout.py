@@ -306,14 +306,14 @@ def _models(sheet: Sheet) -> set[int]:
     # of the others, while the first column names the rows
     if not names_rows(sheet, 0):
         return set()
-    n_rows, columns = len(sheet.numbers), sheet.columns
     return {
         place
         for place, name in enumerate(sheet.header[1:], start=1)
-        if name.casefold() == "model" and len(columns[place].texts) < n_rows
-        if {*columns[place].texts}.issubset(
+        if name.casefold() == "model"
+        if len(sheet.columns[place].texts) < len(sheet.numbers)
+        if {*sheet.columns[place].texts}.issubset(
             text
-            for k, column in enumerate(columns)
+            for k, column in enumerate(sheet.columns)
             if k not in (0, place)
             for text in column.texts
         )

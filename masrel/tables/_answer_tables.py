@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
@@ -19,6 +19,7 @@ from masrel.estimates import (
     _population,
     as_document,
 )
+from masrel.plots._drawn_values import FOREST, Drawn
 from masrel.tables._estimate_words import (
     Noun,
     forest_row,
@@ -28,9 +29,6 @@ from masrel.tables._estimate_words import (
     sentence,
 )
 from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, table_of
-
-if TYPE_CHECKING:
-    from masrel.plots._drawn_values import Drawn
 
 Detail = Literal["brief", "usual", "all"]
 """How much notes explain: what must be known, how numbers were computed, what
@@ -593,10 +591,8 @@ def _why_null(estimate: Estimate) -> list[str]:
     ]
 
 
-def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
+def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> Drawn:
     """Return what a figure shows: the estimates and their intervals."""
-    from masrel.plots._drawn_values import FOREST, Drawn
-
     # what is in the units of the ratings is on no axis of agreement
     rows = [row for row in rows if not is_in_units(row)]
     refuse(

@@ -4,19 +4,17 @@ import math
 import re
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
+from masrel.plots._drawn_values import ForestRow
 from masrel.tables._tables import (
     counted,
     interval_text,
     number,
     percent,
 )
-
-if TYPE_CHECKING:
-    from masrel.plots._drawn_values import ForestRow
 
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
@@ -39,10 +37,8 @@ _POPULATIONS = {  # of studies that are repeated, and of one value
 
 def forest_row(
     label: str, estimate: Estimate, *, detail: str = "", group: str = ""
-) -> "ForestRow":
+) -> ForestRow:
     """Return the row of an estimate in a forest."""
-    from masrel.plots._drawn_values import ForestRow  # a table has no figure
-
     value, interval = estimate.value, estimate.interval
     text = number(value, 3)
     low, high = (0.0, math.inf) if interval is None else (interval.low, interval.high)

@@ -1,13 +1,10 @@
 """The table and the JSON of a latent-trait model of ratings."""
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from masrel.estimates import as_document
+from masrel.intervals import LatentTrait, Quantity
 from masrel.tables._tables import Column, Table, number, percent, significant, table_of
-
-if TYPE_CHECKING:
-    from masrel.intervals import LatentTrait, Quantity
 
 _COLUMNS = (
     Column(key="what", heading="What", align="left"),
@@ -23,7 +20,7 @@ _COLUMNS = (
 _UNLIKELY = 0.01
 
 
-def latent_table(result: "LatentTrait", *, read: tuple[str, ...], data: str) -> Table:
+def latent_table(result: LatentTrait, *, read: tuple[str, ...], data: str) -> Table:
     """Return the table of every quantity of the model with its interval."""
     # intervals under the other prior stand beside those under the first
     beside = result.other or result
@@ -42,7 +39,7 @@ def latent_table(result: "LatentTrait", *, read: tuple[str, ...], data: str) -> 
     )
 
 
-def _rows(result: "LatentTrait") -> Iterator[dict[str, object]]:
+def _rows(result: LatentTrait) -> Iterator[dict[str, object]]:
     quantities: list[tuple[str, Iterable[Quantity]]] = [
         ("bias", result.raters),
         ("noise", result.noises),
@@ -60,7 +57,7 @@ def _rows(result: "LatentTrait") -> Iterator[dict[str, object]]:
             yield {"what": what, "of": name, "median": median, **ends}
 
 
-def _notes(result: "LatentTrait") -> Iterator[str]:
+def _notes(result: LatentTrait) -> Iterator[str]:
     # what the numbers are about, and their unit
     if (interval := result.kappa.interval) is not None:
         whom = "these items" if interval.target == "raters" else "new items like these"
@@ -98,7 +95,7 @@ def _notes(result: "LatentTrait") -> Iterator[str]:
     )
 
 
-def latent_document(result: "LatentTrait") -> dict[str, object]:
+def latent_document(result: LatentTrait) -> dict[str, object]:
     """Return a result as plain values for JSON, every digit kept."""
     parts = {
         "items": result.items,
@@ -129,7 +126,7 @@ def latent_document(result: "LatentTrait") -> dict[str, object]:
     }
 
 
-def _quantity(quantity: "Quantity") -> dict[str, object]:
+def _quantity(quantity: Quantity) -> dict[str, object]:
     return {
         "name": quantity.name,
         "value": quantity.value,

@@ -25,6 +25,7 @@ from masrel.plots._style import (
 )
 from masrel.plots._traces import (
     Against,
+    Floats,
     Stretch,
     draw_traces,
     name_traces,
@@ -36,9 +37,8 @@ _GRADED = 2.2  # times as wide is a line of a stretch that a grade rests on
 # of where most of many stretches are: the outer pair of ends, and the inner one
 _BAND = dict(zip(("middle 90 %", "middle 50 %"), BANDS, strict=True))
 
-_Floats = NDArray[np.float64]
 TracePanel = tuple[
-    str, Sequence[Stretch], Sequence[bool], Sequence[str], Mapping[str, _Floats] | None
+    str, Sequence[Stretch], Sequence[bool], Sequence[str], Mapping[str, Floats] | None
 ]
 """A title; lines, whether each is wider, and what is written at it, if anything; and
 where most of many are: "time", and the ends of "angle", deg, and of "torque"."""
@@ -170,7 +170,7 @@ def _bottom(row: Iterable[Axes]) -> float:
 
 _MARKERS = ((BLUE, "o"), (VERMILLION, "s"), (BLACK, "^"), (ORANGE, "D"), (GREY, "v"))
 
-Catches = tuple[str, _Floats, _Floats, _Floats, _Floats, tuple[float, float]]
+Catches = tuple[str, Floats, Floats, Floats, Floats, tuple[float, float]]
 """A model; for each motion the mean speed before its catch, deg/s, the angle of it,
 deg, the mean speed during it, deg/s, and how long it lasts, s, ``nan`` where the motion
 ends within it; and ν_L and ν_H of (6), deg/s."""
