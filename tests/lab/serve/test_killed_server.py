@@ -281,7 +281,7 @@ def test_it_is_neither_merged_nor_exported_nor_reported(
         for old, new in zip(("R1", "R2"), raters, strict=True):
             text = text.replace(f'"{old}"', f'"{new}"')
         study.protocol.write_text(text)
-        study.secret_file.parent.mkdir(mode=0o700)
+        study.secret_file.parent.mkdir(mode=0o700, exist_ok=True)
         study.secret_file.write_text(f"format: 1\nsecret: {'5a' * 16}\n")
         allot_schedules(study, protocol := read_protocol(study.protocol))
         grades = SimulatedGrades(protocol)
