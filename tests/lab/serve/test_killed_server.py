@@ -15,7 +15,7 @@ import pytest
 
 from masrel.lab._event_log import read_log
 from masrel.lab.conduct import allot_schedules
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
 from masrel.lab.recording import read_recording
 from masrel.lab.run._simulated_raters import SimulatedGrades
 from masrel.lab.run.session import run_session
@@ -276,12 +276,12 @@ def test_it_is_neither_merged_nor_exported_nor_reported(
     masrel, private, merged = Caller(monkeypatch, capsys), list[bytes](), "merged"
     for site, raters in (("north", ("R1", "R2")), ("south", ("R3", "R4"))):
         study = StudyPaths(tmp_path / site)
-        small_study(study.root)
+        copy_template("small", study.root)
         text = study.protocol.read_text()
         for old, new in zip(("R1", "R2"), raters, strict=True):
             text = text.replace(f'"{old}"', f'"{new}"')
         study.protocol.write_text(text)
-        study.secret_file.parent.mkdir(mode=0o700, exist_ok=True)
+        study.secret_file.parent.mkdir(mode=0o700)
         study.secret_file.write_text(f"format: 1\nsecret: {'5a' * 16}\n")
         allot_schedules(study, protocol := read_protocol(study.protocol))
         grades = SimulatedGrades(protocol)
