@@ -282,7 +282,7 @@ def _wide(
     item, raters, is_guessed = named.get("item", ()), named.get("raters", ()), False
     places = range(len(sheet.header))
     if not item and not options.no_item:
-        others = taken.union(raters, known, _models(sheet))
+        others = taken.union(raters, known)
         usual = () if kind == "table" else _usual(sheet, "item", others)
         item = usual or tuple([place for place in places if place not in others][:1])
         is_guessed = bool(item) and not usual and "frequency" not in named
@@ -299,25 +299,6 @@ def _wide(
     return Layout(
         kind=kind, item=item, raters=raters, grades=raters, is_item_guessed=is_guessed
     )
-
-
-def _models(sheet: Sheet) -> set[int]:
-    # columns of models that rated, not of those that were rated: they have the grades
-    # of the others, while the first column names the rows
-    if not names_rows(sheet, 0):
-        return set()
-    return {
-        place
-        for place, name in enumerate(sheet.header[1:], start=1)
-        if name.casefold() == "model"
-        if len(sheet.columns[place].texts) < len(sheet.numbers)
-        if {*sheet.columns[place].texts}.issubset(
-            text
-            for k, column in enumerate(sheet.columns)
-            if k not in (0, place)
-            for text in column.texts
-        )
-    }
 
 
 def _refuse_comments(sheet: Sheet, raters: Sequence[int]) -> None:
@@ -506,6 +487,10 @@ def rated_twice(
     is_wide = layout.kind == "wide"
     guess = "; if each row is one rating, name columns with --rater, --grade" * is_wide
     guess += "; if no column names items, add --no-item" * layout.is_item_guessed
+    # a usual name of items, such as model, may be that of a rater
+    first = sheet.header[0]
+    if is_wide and first and 0 not in layout.item and names_rows(sheet, 0):
+        guess += f"; if {first!r} names the items, add --item{few([first])}"
     return sheet.refuse(
         "twice",
         rows=" and ".join(sheet.where(row) for row in rows.tolist()),

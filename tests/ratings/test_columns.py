@@ -191,22 +191,17 @@ def test_which_columns_are_no_raters(
 
 
 @pytest.mark.parametrize("first", ["patient", "id"])
-@pytest.mark.parametrize(
-    ("name", "known"),
-    [
-        # who is known by name is a rater, whatever the column is called
-        *((name, (name,)) for name in ("model", "judge", "annotator", "rating")),
-        # grades of the others are grades, and not names of models that were rated
-        ("Model", ()),
-    ],
-)
+@pytest.mark.parametrize("name", ["model", "judge", "annotator", "rating"])
 def test_columns_of_raters_that_have_usual_names(
-    tmp_path: Path, first: str, name: str, known: tuple[str, ...]
+    tmp_path: Path, first: str, name: str
 ) -> None:
     text = beside(name, SAME).replace("patient", first)
-    file = read(tmp_path, text, known=known)
-    assert file.read["raters"] == ["Kim", "Lee", "Ann", name]
-    assert file.read["item"] == [first]
+    with pytest.raises(RatingsError, match=r"--item|--raters"):
+        read(tmp_path, text)
+    for options in ({"known": (name,)}, {"reference": name}):
+        file = read(tmp_path, text, **options)
+        assert file.read["raters"] == ["Kim", "Lee", "Ann", name]
+        assert file.read["item"] == [first]
 
 
 DIFFERENT = beside("n", SAME).replace("e,1,1,2", "e,2,1,2")
