@@ -621,7 +621,7 @@ def _lateness(parts: list[Recording], rate_hz: int) -> tuple[dict[str, object], 
         "99.9 % {p999:.3f}, all {max:.3f}".format(**shares)
     )
     return (
-        {"late_ms": shares, "n_missed_ticks": n_missed},
+        {"late_ms": shares, "n_ticks": late.size, "n_missed_ticks": n_missed},
         f"{line}; missed {n_missed} of {n_missed + late.size}",
     )
 
@@ -652,10 +652,10 @@ def _presented(
         )
     options = session.options.emulated(_START) if hand else session.options
     limits = device_limits(table_v.device)
-    if still_s is not None:  # what is late is to be counted, up to the watchdog's time
-        limits = dataclasses.replace(
-            limits, missed_ticks=1_000_000, stale_time=limits.watchdog_time
-        )
+    if still_s is not None:  # what is late is to be counted
+        limits = dataclasses.replace(limits, missed_ticks=1_000_000)
+    if still_s is not None and hand:  # and stops nothing where no hardware moves
+        limits = dataclasses.replace(limits, stale_time=limits.watchdog_time)
     used = dataclasses.replace(session, clock=clock, hand=hand, options=options)
     with used.moving() as (device, watching):
         if calibration is not None:

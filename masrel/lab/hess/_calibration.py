@@ -314,6 +314,7 @@ def lateness_ms(recordings: Sequence[Recording], rate_hz: int) -> _Floats:
     """Return how late each tick was, beside the prompt ones of its recording, ms."""
     # A reading takes its time on the bus, the same for most ticks, and one that comes
     # in the next tick's time is still late: prompt ones are at most so little earlier.
+    # It holds while fewer than one tick in a hundred is nearly a tick late.
     period_ns = 1e9 / rate_hz
     room_ns, late_ns = 0.05 * period_ns, []
     for each in recordings:

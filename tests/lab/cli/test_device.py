@@ -1,9 +1,11 @@
 """``masrel device`` against an emulated puck."""
 
 import importlib
+import itertools
 import json
 import shutil
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -117,6 +119,37 @@ def test_a_signal_in_a_minute_of_real_time_begins_no_other(
     done = masrel("device", "fidelity", "--device", "simulated", "--minutes", 2)
     assert (done.code, minutes) == (1, [60.0])
     assert "emergency stop: signal SIGTERM" in done.err
+
+
+@pytest.mark.slow  # 32 stretches come before the minutes
+@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")
+def test_a_late_reading_in_a_minute_of_an_emulator_is_counted(
+    masrel: Caller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def delayed(device, *arguments, max_duration_s=None, **options):
+        if max_duration_s is not None:
+            read, n_read = device.read, itertools.count()
+
+            def late() -> object:
+                reading = read()
+                if next(n_read) == 100:
+                    time.sleep(0.01)  # twice as long as a session allows
+                return reading
+
+            monkeypatch.setattr(device, "read", late)
+        return run_presentation(
+            device, *arguments, max_duration_s=max_duration_s, **options
+        )
+
+    module = importlib.import_module("masrel.lab.cli.device")
+    monkeypatch.setattr(module, "run_presentation", delayed)
+    call = ("device", "fidelity", "--device", "simulated", "--minutes", 0.01)
+    done = masrel(*call, "--json", "-")
+    document = json.loads(done.out)
+    # a machine that does other things may be away for longer, which is another fault
+    assert not any(fault.startswith("stale") for fault in document["faults"])
+    assert document["n_missed_ticks"] >= 9
+    assert document["n_ticks"] > 100
 
 
 def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
