@@ -46,7 +46,7 @@ class Rating(NamedTuple):
     graded_stretch : int or None
         Number of the stretch that the grade rests on; None when not said.
     felt : str or None
-        What could be felt, one of `masrel.lab.run._state.FELT`; None when unknown.
+        What could be felt, "felt", "below-threshold" or "no-catch"; None when unknown.
     grades_from : str or None
         Name of the source of the session's grades; None when unknown.
     device : str or None
